@@ -39,7 +39,8 @@ std::array<double, kFootCount> GroundForceObserver::update(const RobotModel& rob
   const bool first = stamp_ns_ < 0;
   const double dt_s = first ? 0.0 : seconds(joints.stamp_ns - stamp_ns_);
   const double share = first ? 1.0 : dt_s / (params_.smoothing_s + dt_s), rate_ps = 1.0 / params_.smoothing_s;
-  const double learning = std::min(dt_s, params_.smoothing_s) / params_.friction_s;  // after a gap, too
+  const double learnt_s = std::min(dt_s, params_.smoothing_s);  // after a gap, too
+  const double learning_friction = learnt_s / params_.friction_s, learning_armature = learnt_s / params_.armature_s;
   stamp_ns_ = joints.stamp_ns;
   felt_mps2_ += share * (base.accel_mps2 - felt_mps2_);
   const PerLink p_m = base_p_links_m(robot.masses, frames);
@@ -49,7 +50,10 @@ std::array<double, kFootCount> GroundForceObserver::update(const RobotModel& rob
     const LegVector dq_radps = leg_joints(joints.dq_radps, foot);
     const auto v_mps = link_velocities_mps(frames[f], p_m.leg[f], dq_radps, base.gyro_radps);
     Leg& leg = legs_[f];
-    if (first) leg.link_mps = v_mps;
+    if (first) {
+      leg.link_mps = v_mps;
+      leg.armature_kgm2.setConstant(robot.drives.armature_kgm2);
+    }
     std::array<Vec3, kJointsPerLeg> specific_mps2;
     for (std::size_t j = 0; j < kJointsPerLeg; ++j) {
       leg.link_mps[j] += share * (v_mps[j] - leg.link_mps[j]);
@@ -62,10 +66,15 @@ std::array<double, kFootCount> GroundForceObserver::update(const RobotModel& rob
       double& way = leg.way[j];
       way += share * (math::clamp(dq_radps[j] / params_.creep_radps, -1.0, 1.0) - way);
       double& friction_nm = leg.friction_nm[j];
-      left_nm[j] -= robot.drives.armature_kgm2 * rate_ps * (dq_radps[j] - leg.dq_radps[j]) + friction_nm * way;
+      double& armature_kgm2 = leg.armature_kgm2[j];
+      const double accel_radps2 = rate_ps * (dq_radps[j] - leg.dq_radps[j]);
+      left_nm[j] -= armature_kgm2 * accel_radps2 + friction_nm * way;
       if (!hangs[f]) continue;  // on the ground a joint that hardly turns may be held either way
       // Nothing else is left in the air but what masses are off, which goes both ways of a swing alike.
-      friction_nm = math::clamp(friction_nm + learning * way * left_nm[j], 0.0, params_.most_friction_nm);
+      friction_nm = math::clamp(friction_nm + learning_friction * way * left_nm[j], 0.0, params_.most_friction_nm);
+      const double tells = accel_radps2 / (math::square(accel_radps2) + math::square(params_.brisk_radps2));
+      armature_kgm2 = math::clamp(armature_kgm2 + learning_armature * tells * left_nm[j], 0.0,
+                                  robot.drives.armature_kgm2 + params_.more_armature_kgm2);
     }
     const LegJacobian J = leg_jacobian(frames[f]);
     Eigen::Matrix<double, 6, 6> A = J * J.transpose();

@@ -53,7 +53,8 @@ struct Sample {
   Vec3 base_up;
 };
 // What drives and IMU tell of that motion while the ground gives each foot that force.
-Sample sample(const RobotModel& robot, double t_s, const std::array<double, kFootCount>& up_n, double friction_nm) {
+Sample sample(const RobotModel& robot, double t_s, const std::array<double, kFootCount>& up_n, double friction_nm,
+              double armature_kgm2 = RobotModel{}.drives.armature_kgm2) {
   Sample s;
   const Transform base = Motion::world_T_base(t_s);
   const Vec3 up = base.R.transpose() * Vec3::UnitZ();
@@ -74,7 +75,7 @@ Sample sample(const RobotModel& robot, double t_s, const std::array<double, kFoo
     }
     const SoleWrench ground{up_n[index_of(foot)] * up, Vec3::Zero()};
     LegVector tau = leg_torques_nm(robot.masses, foot, leg_frames(robot.legs, foot, q), specific_mps2, ground) +
-                    robot.drives.armature_kgm2 * ddq;
+                    armature_kgm2 * ddq;
     for (Eigen::Index j = 0; j < tau.size(); ++j) tau[j] += friction_nm * std::tanh(dq[j] / 0.02);
     const auto at = static_cast<Eigen::Index>(joint_index(foot, 0));
     s.joints.q_rad.segment<6>(at) = q;
@@ -149,6 +150,28 @@ TEST(GroundForceObserver, LegsHang_FrictionIsLearnt) {
   for (Eigen::Index j = 0; j < observer.friction_nm(Foot::kLeft).size(); ++j) {
     EXPECT_NEAR(observer.friction_nm(Foot::kLeft)[j], 3.0, 0.5) << j;
     EXPECT_EQ(observer.friction_nm(Foot::kRight)[j], params.friction_nm) << j;
+  }
+}
+
+// Four times as much as the robot's file says, and less than it says.
+TEST(GroundForceObserver, LegsHang_ArmatureIsLearnt) {
+  const RobotModel robot;
+  for (const double armature_kgm2 : {0.2, 0.02}) {
+    GroundForceObserver observer;
+    observer.reset({});
+    std::array<double, kFootCount> last_n{};
+    for (int i = 0; i < 1000; ++i) {  // the left leg hangs, the right one is not known to
+      const Sample s = sample(robot, i * kDt_s, {0.0, 0.0}, 1.0, armature_kgm2);
+      const auto force_n =
+          observer.update(robot, body_frames(robot.legs, s.joints.q_rad), s.joints, s.base, s.base_up, {true, false});
+      if (i < 750) continue;
+      for (std::size_t f = 0; f < kFootCount; ++f) last_n[f] = std::max(last_n[f], std::abs(force_n[f]));
+    }
+    for (const Eigen::Index j : {Eigen::Index{kHipPitch}, Eigen::Index{kKnee}}) {
+      EXPECT_NEAR(observer.armature_kgm2(Foot::kLeft)[j], armature_kgm2, 0.02) << j;
+      EXPECT_EQ(observer.armature_kgm2(Foot::kRight)[j], robot.drives.armature_kgm2) << j;
+    }
+    EXPECT_LT(last_n[0], 0.7 * last_n[1]) << "what is not learnt is taken for ground";
   }
 }
 
