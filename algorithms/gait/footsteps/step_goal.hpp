@@ -26,8 +26,9 @@ enum class StepKind : std::uint8_t {
 struct StepGoal {
   StepKind kind = StepKind::kFloor;
   Foot foot = Foot::kLeft;
-  SolePose target;    // odom
-  Foothold foothold;  // the same, as it was found
+  SolePose target;      // odom
+  Foothold foothold{};  // the same, as it was found
+  bool walks = false;   // on the way to a place, away from what the foot stood on
 };
 
 }  // namespace polygmap

@@ -78,6 +78,7 @@ StepPlan plan_step(const StepParams& params, const StepGoal& goal, const SolePai
                : down    ? params.down.swing
                : passing ? params.passing_swing
                          : params.stair_swing;
+  if (goal.walks) plan.shape.retreat_m = -params.down.leave_m;
   plan.shift_ticks = on_floor ? params.durations.floor_shift_ticks : params.durations.stair_shift_ticks;
   const std::int32_t usual_ticks = on_floor  ? params.durations.floor_swing_ticks
                                    : down    ? params.durations.down_swing_ticks

@@ -79,6 +79,7 @@ struct StepDownParams {
   double lean_rad = 0.15;
   double turn_rad = 0.35;
   double com_above_base_m = 0.09;
+  double leave_m = 0.008;
   HeelRiseParams heel_rise;
 
   static void visit(auto& p, auto& field) {
@@ -95,6 +96,8 @@ struct StepDownParams {
           "The torso leans ahead by this when the leading foot lands, which keeps the hips back.");
     field("turn_rad", p.turn_rad, 0.0, 0.5, "It turns by this, the hip of the leading foot ahead.");
     field("com_above_base_m", p.com_above_base_m, 0.0, 0.5, "Centre of mass above the base, with legs bent.");
+    field("leave_m", p.leave_m, 0.0, 0.05,
+          "A foot that walks on goes ahead by this as it lifts: the riser that it came down may be at its heel.");
     field("heel_rise", p.heel_rise);
   }
 };
