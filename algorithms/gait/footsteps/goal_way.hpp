@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <limits>
+#include <memory>
 #include <optional>
 
 #include "algorithms/core/messages/footholds.hpp"
@@ -76,7 +77,7 @@ class GoalWay {
   void watch(const GoalWayParams& params, const Input& in) noexcept;
   // A step was taken: what is in the way is looked for anew.
   void stepped() noexcept;
-  void forget() noexcept { *this = {}; }
+  void forget() noexcept { std::construct_at(this); }  // in place: another one would take kilobytes of stack
   // The step to the next place came out so, this tick.
   void walked(const GoalWayParams& params, const Input& in, LevelStep::Outcome outcome,
               const Refusal& refusal) noexcept;
