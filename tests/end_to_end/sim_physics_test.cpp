@@ -192,15 +192,18 @@ INSTANTIATE_TEST_SUITE_P(Single, PerceptionLost,
 
 // The search is told to allow what the legs cannot do.
 TEST(PhysicalStop, StepBeyondTheLegs_StandsOnBothFeetAndSaysSo) {
-  SimOptions options = stairs_of(1, 2);  // of two as steep the search says itself that they are too high
-  options.stairs.rise_m = 0.30;
-  Params params;
-  params.footholds.rise_max_m = 0.40;
-  PhysicalClimb climb(options, params);
-  climb.run(40.0);
-  EXPECT_EQ(climb.status().phase, GaitPhase::kStopped);
-  EXPECT_EQ(climb.status().stop_reason, StopReason::kLegsCannot);
-  EXPECT_TRUE(stands_for(climb, 3.0)) << climb.com_error_m() << climb.truth().fall_reason;
+  // Of two as steep the search says itself that they are too high.
+  for (const auto& [steps, reason] : {std::pair{1, StopReason::kLegsCannot}, std::pair{2, StopReason::kRiseTooHigh}}) {
+    SimOptions options = stairs_of(steps, 2);
+    options.stairs.rise_m = 0.30;
+    Params params;
+    params.footholds.rise_max_m = 0.40;
+    PhysicalClimb climb(options, params);
+    climb.run(40.0);
+    EXPECT_EQ(climb.status().phase, GaitPhase::kStopped);
+    EXPECT_EQ(climb.status().stop_reason, reason);
+    EXPECT_TRUE(stands_for(climb, 3.0)) << climb.com_error_m() << climb.truth().fall_reason;
+  }
 }
 
 TEST(PhysicalSingleStep, FourSteps_OneFootOnEveryStepAndBothOnTheLast) {

@@ -70,7 +70,8 @@ std::array<double, kFootCount> GroundForceObserver::update(const RobotModel& rob
       const double accel_radps2 = rate_ps * (dq_radps[j] - leg.dq_radps[j]);
       left_nm[j] -= armature_kgm2 * accel_radps2 + friction_nm * way;
       if (!hangs[f]) continue;  // on the ground a joint that hardly turns may be held either way
-      // Nothing else is left in the air but what masses are off, which goes both ways of a swing alike.
+      // Nothing else is left in the air but what masses are off. For friction that goes both ways of a swing alike; of
+      // the armature it is a part, as of a heavier drive.
       friction_nm = math::clamp(friction_nm + learning_friction * way * left_nm[j], 0.0, params_.most_friction_nm);
       const double tells = accel_radps2 / (math::square(accel_radps2) + math::square(params_.brisk_radps2));
       armature_kgm2 = math::clamp(armature_kgm2 + learning_armature * tells * left_nm[j], 0.0,

@@ -110,7 +110,9 @@ void GoalWay::watch(const GoalWayParams& params, const Input& in) noexcept {
   const double goal_m = (in.goal.odom_p_m - middle.position_m.head<2>()).norm();
   if (goal_m < nearest_m_ - kNearer_m) {
     nearest_m_ = goal_m;
-    steps_ = 0;
+    steps_ = shut_places_ = 0;
+    first_refusal_.reset();
+    gave_up_for_.reset();
   }
   const Vec2 to_m = looks_first() ? look_from_->odom_p_m : in.goal.odom_p_m;
   if (route_.is_busy()) {
@@ -123,7 +125,7 @@ void GoalWay::watch(const GoalWayParams& params, const Input& in) noexcept {
   is_known_ = true;
   const Vec2 way_m = to_m - middle.position_m.head<2>();
   faces_ = std::abs(math::wrap_angle(math::atan2(way_m.y(), way_m.x()) - middle.yaw_rad)) < params.faces_rad;
-  if (route_.way() != GroundRoute::Way::kRound || steps_ >= params.most_steps) {
+  if (route_.way() != GroundRoute::Way::kRound || steps_ >= params.most_steps || gave_up_for_) {
     goes_round_ = false;
     round_ticks_ = 0;
   } else if (faces_ && ++round_ticks_ >= params.sure_ticks) {
@@ -140,17 +142,20 @@ void GoalWay::walked(const GoalWayParams& params, const Input& in, LevelStep::Ou
   if (looks_first() && outcome == LevelStep::Outcome::kArrived) looked_ = true;
   if (++refused_ticks_ < params.sure_ticks || gave_up_for_) return;
   refused_ticks_ = 0;
-  if (!first_refusal_) first_refusal_ = refusal;
-  if (++all_refusals_ > params.most_refusals || steps_ >= params.most_steps) {
-    gave_up_for_ = first_refusal_;
-    return;
-  }
-  const bool last_way_is_stairs = ++refusals_ > 1 && other_stairs_ && !takes_any_;
+  const bool shut = outcome != LevelStep::Outcome::kArrived;
+  if (shut && !first_refusal_) first_refusal_ = refusal;
+  if (shut && refusals_ == 0) ++shut_places_;  // who waits before a thing that may go is in one place
+  const bool searched = shut_places_ > params.most_refusals || steps_ >= params.most_steps;
+  const bool last_way_is_stairs = (++refusals_ > 1 || searched) && other_stairs_ && !takes_any_;
   if (last_way_is_stairs) {
+    steps_ = shut_places_ = 0;  // the way to them may lead away from the goal
+    nearest_m_ = std::numeric_limits<double>::infinity();
     takes_any_ = true;
     look_from_ = other_stairs_;
     looked_ = false;
     barred_ = {};
+  } else if (searched) {
+    gave_up_for_ = first_refusal_;
   } else if (looks_first()) {
     looked_ = true;  // from as near as it could come
   } else if (outcome == LevelStep::Outcome::kNoGround) {

@@ -44,7 +44,7 @@ struct GoalWayParams {
     field("most_steps", p.most_steps, 0, 10000,
           "It looks for no other way after as many steps without coming nearer to the goal.");
     field("most_refusals", p.most_refusals, 1, 1000,
-          "Where it came no further so often between two treads, it looks for no other way.");
+          "It looks for no other way after it came no further in so many places without coming nearer to the goal.");
     field("faces_rad", p.faces_rad, 0.05, 3.2, "It turns to what is in the way, within this, before it goes round.");
     field("tried_m", p.tried_m, 0.1, 1.0,
           "Where it stood before a thing and came no further, no way leads through so much about its place.");
@@ -88,7 +88,8 @@ class GoalWay {
   [[nodiscard]] bool takes_any_stairs() const noexcept { return takes_any_; }
   // The next place is not the goal.
   [[nodiscard]] bool is_on_its_way() const noexcept { return looks_first() || goes_round_; }
-  // What was in the way where it first came no further, once it looks for no other way.
+  // What was in the way where it first came no further since it was nearest to the goal, once it looks for no other
+  // way.
   [[nodiscard]] const std::optional<Refusal>& gave_up_for() const noexcept { return gave_up_for_; }
   // Where to walk next; none: that is not known yet.
   [[nodiscard]] std::optional<WalkGoal> next(const WalkGoal& goal) const noexcept;
@@ -112,8 +113,8 @@ class GoalWay {
   std::int32_t round_ticks_ = 0, refused_ticks_ = 0, ticks_ = 0, steps_ = 0;
   double nearest_m_ = std::numeric_limits<double>::infinity();  // to the goal, since the last tread
   std::int32_t refusals_ = 0;                                   // since the last step
-  std::int32_t all_refusals_ = 0;                               // since the last tread
-  std::optional<Refusal> first_refusal_, gave_up_for_;
+  std::int32_t shut_places_ = 0;                        // where it came no further, since it was nearest to the goal
+  std::optional<Refusal> first_refusal_, gave_up_for_;  // since then
 };
 
 }  // namespace polygmap

@@ -97,7 +97,9 @@ struct StepDownParams {
     field("turn_rad", p.turn_rad, 0.0, 0.5, "It turns by this, the hip of the leading foot ahead.");
     field("com_above_base_m", p.com_above_base_m, 0.0, 0.5, "Centre of mass above the base, with legs bent.");
     field("leave_m", p.leave_m, 0.0, 0.05,
-          "A foot that walks on goes ahead by this as it lifts: the riser that it came down may be at its heel.");
+          "A foot that walks ahead to a place goes by this farther ahead as it lifts: a riser that it came down may be "
+          "at its "
+          "heel.");
     field("heel_rise", p.heel_rise);
   }
 };

@@ -168,7 +168,7 @@ TEST(GroundForceObserver, LegsHang_ArmatureIsLearnt) {
       for (std::size_t f = 0; f < kFootCount; ++f) last_n[f] = std::max(last_n[f], std::abs(force_n[f]));
     }
     for (const Eigen::Index j : {Eigen::Index{kHipPitch}, Eigen::Index{kKnee}}) {
-      EXPECT_NEAR(observer.armature_kgm2(Foot::kLeft)[j], armature_kgm2, 0.02) << j;
+      EXPECT_NEAR(observer.armature_kgm2(Foot::kLeft)[j], armature_kgm2, 0.015) << j;
       EXPECT_EQ(observer.armature_kgm2(Foot::kRight)[j], robot.drives.armature_kgm2) << j;
     }
     EXPECT_LT(last_n[0], 0.7 * last_n[1]) << "what is not learnt is taken for ground";

@@ -168,6 +168,22 @@ TEST_F(GoalWayTest, RefusedAgainAndAgain_GivesUpForWhatWasInTheWayFirst) {
   ASSERT_TRUE(way_.gave_up_for());
   EXPECT_EQ(way_.gave_up_for()->reason, StopReason::kDropTooDeep);
   EXPECT_EQ(way_.gave_up_for()->measured_m, 0.4);
+  soles_ = stand_at({0.05, 0.5}, 0.0);
+  watch(1);
+  EXPECT_FALSE(way_.gave_up_for()) << "nearer to the goal there may be a way";
+}
+
+TEST_F(GoalWayTest, StandsBeforeAThingForLong_IsOnePlace) {
+  walked(3 * params_.most_refusals * params_.sure_ticks, LevelStep::Outcome::kBlocked, {StopReason::kObstacle, 0.0});
+  EXPECT_FALSE(way_.gave_up_for());
+}
+
+TEST_F(GoalWayTest, ArrivedOnItsWay_IsNoReasonToGiveUp) {
+  for (int i = 0; i <= params_.most_refusals; ++i) {
+    walked(params_.sure_ticks, LevelStep::Outcome::kArrived);
+    way_.stepped();
+  }
+  EXPECT_FALSE(way_.gave_up_for());
 }
 
 // A detour leads away from the goal for a while; one that never comes nearer is none.
