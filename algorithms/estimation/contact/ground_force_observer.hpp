@@ -20,7 +20,7 @@ class GroundForceObserver {
     double most_friction_nm = 5.0;
     double friction_s = 0.5;
     double creep_radps = 0.05;
-    double armature_s = 0.3;
+    double armature_s = 0.3;  // this and what follows for armatures: chosen by hand, tried in the simulation alone
     double brisk_radps2 = 10.0;
     double more_armature_kgm2 = 0.25;
     double damping_m = 0.02;

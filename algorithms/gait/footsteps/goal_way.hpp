@@ -23,7 +23,7 @@ struct GoalWayParams {
   double looked_rad = 0.15;
   double moved_m = 0.12;
   std::int32_t most_looks = 12;
-  std::int32_t most_steps = 40;
+  std::int32_t most_steps = 40;  // this and most_refusals: chosen by hand, tried on a few worlds of the simulation
   std::int32_t most_refusals = 6;
   double faces_rad = 0.5;
   double tried_m = 0.35;

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "algorithms/estimation/contact/contacts.hpp"
 #include "algorithms/robot/leg_kinematics.hpp"
 #include "tests/support/nominal_robot.hpp"
 
@@ -176,14 +177,22 @@ TEST(GroundForceObserver, LegsHang_ArmatureIsLearnt) {
 }
 
 // Of the left foot, which the ground presses with 270 N: the worst error in two seconds after the leg has hung or not.
-double error_on_the_ground_n(bool hung_before) {
+// The true robot has that friction, armature and legs so many times as heavy as its file says.
+struct TrueLegs {
+  double friction_nm = 1.0;
+  double armature_kgm2 = RobotModel{}.drives.armature_kgm2;
+  double mass_scale = 1.0;
+};
+double error_on_the_ground_n(bool hung_before, const TrueLegs& legs) {
   const RobotModel robot;
+  RobotModel true_robot;
+  for (LinkMass& link : true_robot.masses.leg) link.mass_kg *= legs.mass_scale;
   GroundForceObserver observer;
   observer.reset({});
   double worst_n = 0.0;
   for (int i = 0; i < 2000; ++i) {
     const bool hangs = i < 1000;
-    const Sample s = sample(robot, i * kDt_s, {hangs ? 0.0 : 270.0, 0.0}, 3.0);
+    const Sample s = sample(true_robot, i * kDt_s, {hangs ? 0.0 : 270.0, 0.0}, legs.friction_nm, legs.armature_kgm2);
     const auto force_n = observer.update(robot, body_frames(robot.legs, s.joints.q_rad), s.joints, s.base, s.base_up,
                                          {hangs && hung_before, false});
     if (i > 1050) worst_n = std::max(worst_n, std::abs(force_n[0] - 270.0));
@@ -192,7 +201,23 @@ double error_on_the_ground_n(bool hung_before) {
 }
 
 TEST(GroundForceObserver, FootOnTheGround_FrictionLearntInTheAirCounts) {
-  EXPECT_LT(error_on_the_ground_n(true), 0.6 * error_on_the_ground_n(false));
+  const TrueLegs legs{.friction_nm = 3.0};
+  EXPECT_LT(error_on_the_ground_n(true, legs), 0.6 * error_on_the_ground_n(false, legs));
+}
+
+TEST(GroundForceObserver, FootOnTheGround_ArmatureLearntInTheAirCounts) {
+  const TrueLegs legs{.armature_kgm2 = 0.2};
+  EXPECT_LT(error_on_the_ground_n(true, legs), 0.8 * error_on_the_ground_n(false, legs));
+}
+
+// What is learnt in the air is then a part of the masses' error, too, which on the ground is none of the drives': it
+// may add no more than a foot in the air may press.
+TEST(GroundForceObserver, LegsATenthHeavierOrLighter_WhatIsLearntInTheAirAddsLittleOnTheGround) {
+  const double most_n = ContactEstimator::Params{}.force_air_n;
+  for (const double mass_scale : {0.9, 1.1}) {
+    const TrueLegs legs{.mass_scale = mass_scale};
+    EXPECT_LT(error_on_the_ground_n(true, legs), error_on_the_ground_n(false, legs) + most_n) << mass_scale;
+  }
 }
 
 TEST(GroundForceObserver, StandingStill_FirstSampleTellsTheForce) {
