@@ -1,21 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <time.h>
-
-#include <cerrno>
-
 #include "algorithms/core/time.hpp"
 #include "firmware/daemon/doctor/doctor.hpp"
 #include "firmware/daemon/system/lane_thread.hpp"
+#include "firmware/daemon/system/monotonic_clock.hpp"
 #include "firmware/schedule.hpp"
 
 namespace polygmap::daemon {
 namespace {
-
-std::int64_t monotonic_ns() noexcept {
-  timespec now{};
-  ::clock_gettime(CLOCK_MONOTONIC, &now);
-  return now.tv_sec * kNsPerS + now.tv_nsec;
-}
 
 struct Measurement {
   WakeUps wake_ups;
@@ -27,9 +18,7 @@ void* measure(void* argument) noexcept {
   std::int64_t due_ns = monotonic_ns();
   for (std::uint32_t i = 0; i < measurement.cycles; ++i) {
     due_ns += kCycle_ns;
-    const timespec due{due_ns / kNsPerS, due_ns % kNsPerS};
-    while (::clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &due, nullptr) == EINTR) {
-    }
+    sleep_until(due_ns);
     const std::int64_t late_ns = monotonic_ns() - due_ns;
     measurement.wake_ups.add(static_cast<std::uint64_t>(late_ns > 0 ? late_ns : 0));
     if (late_ns > kCycle_ns) due_ns = monotonic_ns();  // each wake-up by itself

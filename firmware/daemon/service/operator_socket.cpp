@@ -11,13 +11,13 @@
 #include <cerrno>
 #include <charconv>
 #include <cstring>
-#include <ctime>
 #include <optional>
 #include <utility>
 
 #include "algorithms/core/messages/samples.hpp"
 #include "firmware/config/operator_request_text.hpp"
 #include "firmware/daemon/system/error_text.hpp"
+#include "firmware/daemon/system/monotonic_clock.hpp"
 
 namespace polygmap::daemon {
 namespace {
@@ -37,11 +37,6 @@ constexpr std::string_view kTooOld = "refused: it was not heard within half a se
 }
 [[nodiscard]] const sockaddr* generic(const sockaddr_un& address) {
   return reinterpret_cast<const sockaddr*>(&address);
-}
-[[nodiscard]] std::int64_t monotonic_ns() noexcept {
-  timespec now{};
-  ::clock_gettime(CLOCK_MONOTONIC, &now);
-  return now.tv_sec * kNsPerS + now.tv_nsec;
 }
 [[nodiscard]] std::string_view without_end(std::string_view text) noexcept {
   while (!text.empty() && (text.back() == '\n' || text.back() == '\0')) text.remove_suffix(1);

@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "firmware/daemon/system/error_text.hpp"
+#include "firmware/daemon/system/monotonic_clock.hpp"
 #include "firmware/schedule.hpp"
 
 namespace polygmap::daemon {
@@ -35,16 +36,6 @@ constexpr std::size_t kOwnStack_bytes = 64U * 1024U;
 constexpr std::string_view kTooLittleMemory =
     "there is too little memory: it takes a limit of locked memory (ulimit -l, LimitMEMLOCK=) that holds all of it.";
 
-std::int64_t monotonic_ns() noexcept {
-  timespec now{};
-  ::clock_gettime(CLOCK_MONOTONIC, &now);
-  return now.tv_sec * kNsPerS + now.tv_nsec;
-}
-void sleep_until(std::int64_t due_ns) noexcept {
-  const timespec due{due_ns / kNsPerS, due_ns % kNsPerS};
-  while (::clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &due, nullptr) == EINTR) {
-  }
-}
 std::uint64_t thread_page_faults() noexcept {
   rusage usage{};
   ::getrusage(RUSAGE_THREAD, &usage);
