@@ -105,10 +105,10 @@ enum class StateEvent : std::uint8_t {
   constexpr std::array<std::string_view, 8> kTexts{
       "all drives and sensors have answered, and agree",
       "a foot is lifted for a tread",
-      "that foot was put back, and one is lifted for the floor",
+      "a foot is lifted for the floor: one was put back, or it is past the stairs",
       "it has to stop: time is short, commands are refused, a drive errs or is too hot",
       "the gait has stopped, on both feet",
-      "the gait has ended the climb",
+      "the gait has ended the climb, or is at the place it was sent to",
       "the torso leans too far for too long",
       "it was at rest, and the drives hold it"};
   static_assert(kTexts.size() == static_cast<std::size_t>(StateEvent::kLetsGo) + 1);
@@ -129,6 +129,7 @@ inline constexpr auto kAutomaticTransitions = std::to_array<AutomaticTransition>
     {ModuleState::kWalkingUp, StateEvent::kStepsOntoTread, ModuleState::kClimbing},
     {ModuleState::kWalkingUp, StateEvent::kHasToStop, ModuleState::kStopping},
     {ModuleState::kWalkingUp, StateEvent::kGaitStops, ModuleState::kSafeStop},
+    {ModuleState::kWalkingUp, StateEvent::kGaitEnds, ModuleState::kOnTop},
     {ModuleState::kWalkingUp, StateEvent::kFalls, ModuleState::kFallen},
     {ModuleState::kClimbing, StateEvent::kStepsOnFloor, ModuleState::kWalkingUp},
     {ModuleState::kClimbing, StateEvent::kHasToStop, ModuleState::kStopping},

@@ -83,7 +83,7 @@ const char* polygmap_error_text(int error) {
     case POLYGMAP_E_NONE:
       return "There is nothing of that kind, or not yet.";
     case POLYGMAP_E_PLACE:
-      return "That is no place to go to: it is not a number, or farther than 50 m.";
+      return "That is no place to go to: it is not a number, farther than 50 m, or turned by more than 3.2 rad.";
     default:
       return "This is no error of this library.";
   }

@@ -73,7 +73,7 @@ typedef enum polygmap_error {
   POLYGMAP_E_OPERATE = -9,    // there is no such polygmap_operation
   POLYGMAP_E_FULL = -10,      // too many operations wait for a step
   POLYGMAP_E_NONE = -11,      // there is nothing of that kind, or not yet
-  POLYGMAP_E_PLACE = -12,     // no place to go to: not a number, or farther than 50 m
+  POLYGMAP_E_PLACE = -12,     // no place to go to: not a number, farther than 50 m, or turned by more than 3.2 rad
 } polygmap_error;
 
 // One sentence of any number that a function here returned. Never NULL; the text is static.

@@ -157,15 +157,14 @@ TEST(Supervisor, EveryTransitionOfTheOperators_LeadsWhereTheTableSays) {
 TEST(Supervisor, EveryEventInEveryState_LeadsWhereTheTableSaysAndElseNowhere) {
   using State = ModuleState;
   using Event = StateEvent;
-  // A gait that may not step ends no climb, nor does one that has not begun it; one that has ended has no event but
-  // those of the table; before it has its commands, neither gait nor lean is looked at.
+  // A gait that may not step ends nothing; one that has ended has no event but those of the table; before it has its
+  // commands, neither gait nor lean is looked at.
   const auto cannot_be = [](State state, Event event) {
     const bool is_unarmed = state == State::kOff || state == State::kArming;
     const bool lets_go = state == State::kHandingOver || state == State::kReleased;
     const bool is_over = state == State::kSafeStop || state == State::kOnTop || lets_go;
     if (event == Event::kGaitEnds) {
-      return is_unarmed || is_over || state == State::kStanding || state == State::kWalkingUp ||
-             state == State::kHolding;
+      return is_unarmed || is_over || state == State::kStanding || state == State::kHolding;
     }
     if (is_unarmed) return event == Event::kFalls || (event == Event::kArms && state == State::kOff);
     return event == Event::kGaitStops && is_over;

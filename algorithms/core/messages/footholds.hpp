@@ -122,7 +122,7 @@ struct TreadView {
 // Result of one search (eqs 14-28).
 struct FootholdSet {
   std::int64_t map_stamp_ns = 0;  // exposure of the newest fused frame
-  Foothold p_star;                // eq. 26: on the nearest tread higher than the stance
+  Foothold p_star;                // eq. 26: on the next tread
   bool has_p_star = false;
   bool has_p_star_star = false;
   // p* spread to left and right sole, both on the same tread. Their position_m is where a foot is told to go, which is

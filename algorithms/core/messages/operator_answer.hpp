@@ -22,7 +22,7 @@ enum class Refusal : std::uint8_t {
   kEstimateStale,   //
   kFootLifted,      // by the estimate one foot does not carry, or both
   kJointsAway,      // from where they were commanded; the answer names them
-  kNoPlace,         // the destination of a go_to is no place within Destination::kFarthest_m
+  kNoPlace,         // the destination of a go_to is not valid
 };
 // Joints go behind it.
 [[nodiscard]] constexpr std::string_view text_of(Refusal refusal) noexcept {
@@ -35,7 +35,7 @@ enum class Refusal : std::uint8_t {
                                                     "the estimate is too old",
                                                     "not both feet carry",
                                                     "not where commanded:",
-                                                    "that is no place within 50 m"};
+                                                    "that is no place within 50 m, or no turn within 3.2 rad"};
   static_assert(kTexts.size() == static_cast<std::size_t>(Refusal::kNoPlace) + 1);
   return kTexts[static_cast<std::size_t>(refusal)];
 }

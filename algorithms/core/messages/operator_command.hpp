@@ -36,7 +36,7 @@ static_assert(kOperatorCommandNames.size() == static_cast<std::size_t>(OperatorC
 }
 
 // Where to, seen from the middle between the feet as they stand when it is asked: in their heading, ahead and to the
-// left. How high it is there, the map says.
+// left. It has no height: of floors above each other any will do.
 struct Destination {
   static constexpr double kFarthest_m = 50.0;
   double ahead_m = 0.0;

@@ -306,16 +306,14 @@ ClimbPlanner::Decision ClimbPlanner::walk(const Situation& situation, const Foot
   decision.walks = true;
   const LevelWalk walk(params_.walk, robot_->sole, robot_->stance.half_width_m,
                        shortened(params_.floor, floor_.stride_share), params_.rule);
-  const auto step_to = [&](const WalkGoal& to) {
-    return walk.next(situation.soles, memory_.last_swing, !walking_ && floor_.steps == 0, to, footholds.ground);
-  };
-  if (step_to(*goal_.laid_out).outcome == LevelStep::Outcome::kArrived) {  // whatever the way is thought to be
+  if (walk.has_arrived(situation.soles, *goal_.laid_out)) {  // whatever the way is thought to be
     decision.obstruction = StopReason::kAtGoal;
     return decision;
   }
   const std::optional<WalkGoal> to = way_.next(*goal_.laid_out);
   if (!to) return decision;
-  const LevelStep step = step_to(*to);
+  const LevelStep step =
+      walk.next(situation.soles, memory_.last_swing, !walking_ && floor_.steps == 0, *to, footholds.ground);
   decision.walk = step.outcome;
   switch (step.outcome) {
     case LevelStep::Outcome::kArrived:

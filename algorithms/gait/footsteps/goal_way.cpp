@@ -2,6 +2,7 @@
 #include "algorithms/gait/footsteps/goal_way.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "algorithms/geometry/line.hpp"
@@ -171,11 +172,13 @@ void GoalWay::walked(const GoalWayParams& params, const Input& in, LevelStep::Ou
 
 void GoalWay::bar_place(const GoalWayParams& params, const Input& in) noexcept {
   const Vec2 at_m = middle_of(in.soles).position_m.head<2>() - in.footholds.ground.corner_m;
-  for (std::int32_t y = 0; y < GroundView::kSide_cells; ++y) {
-    for (std::int32_t x = 0; x < GroundView::kSide_cells; ++x) {
-      if ((Vec2{x + 0.5, y + 0.5} * GroundView::kCell_m - at_m).norm() > params.tried_m) continue;
-      barred_.tried[static_cast<std::size_t>(y)] |= std::uint64_t{1} << static_cast<std::uint32_t>(x);
-    }
+  const std::int32_t last_y = std::min(GroundView::cell_of(at_m.y() + params.tried_m), GroundView::kSide_cells - 1);
+  for (std::int32_t y = std::max(GroundView::cell_of(at_m.y() - params.tried_m), 0); y <= last_y; ++y) {
+    const double off_m = (y + 0.5) * GroundView::kCell_m - at_m.y();
+    const double half_m = math::sqrt(std::max(math::square(params.tried_m) - math::square(off_m), 0.0));
+    constexpr double kHalf_m = 0.5 * GroundView::kCell_m;  // of a square: its middle counts
+    barred_.tried[static_cast<std::size_t>(y)] |= GroundView::bits_of(GroundView::cell_of(at_m.x() - half_m + kHalf_m),
+                                                                      GroundView::cell_of(at_m.x() + half_m - kHalf_m));
   }
 }
 
@@ -184,14 +187,20 @@ void GoalWay::bar_unseen(const Input& in) noexcept {
   const TorsoPose middle = middle_of(in.soles);
   const Vec2 ahead = unit_at(middle.yaw_rad), left = left_of(ahead);
   constexpr double kFrom_m = 0.10, kTo_m = 0.75, kHalf_m = 0.20, kWider = 0.3;
+  constexpr double kReach_m = kTo_m + kHalf_m;  // more than it is to the farthest corner
   const GroundView& ground = in.footholds.ground;
-  for (std::int32_t y = 0; y < GroundView::kSide_cells; ++y) {
-    for (std::int32_t x = 0; x < GroundView::kSide_cells; ++x) {
-      if (GroundView::has(ground.level, x, y) || GroundView::has(ground.tall, x, y)) continue;
-      const Vec2 p_m = ground.corner_m + Vec2{x + 0.5, y + 0.5} * GroundView::kCell_m - middle.position_m.head<2>();
+  const Vec2 at_m = middle.position_m.head<2>() - ground.corner_m;
+  const std::uint64_t about =
+      GroundView::bits_of(GroundView::cell_of(at_m.x() - kReach_m), GroundView::cell_of(at_m.x() + kReach_m));
+  const std::int32_t last_y = std::min(GroundView::cell_of(at_m.y() + kReach_m), GroundView::kSide_cells - 1);
+  for (std::int32_t y = std::max(GroundView::cell_of(at_m.y() - kReach_m), 0); y <= last_y; ++y) {
+    const auto row = static_cast<std::size_t>(y);
+    for (std::uint64_t unseen = ~(ground.level[row] | ground.tall[row]) & about; unseen != 0; unseen &= unseen - 1) {
+      const int x = std::countr_zero(unseen);
+      const Vec2 p_m = Vec2{x + 0.5, y + 0.5} * GroundView::kCell_m - at_m;
       const double ahead_m = ahead.dot(p_m);
       if (ahead_m < kFrom_m || ahead_m > kTo_m || std::abs(left.dot(p_m)) > kHalf_m + kWider * ahead_m) continue;
-      barred_.unseen[static_cast<std::size_t>(y)] |= std::uint64_t{1} << static_cast<std::uint32_t>(x);
+      barred_.unseen[row] |= std::uint64_t{1} << static_cast<std::uint32_t>(x);
     }
   }
 }

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 
 #include "algorithms/geometry/line.hpp"
 
@@ -11,6 +12,19 @@ namespace polygmap {
 bool LevelWalk::carries(const GroundView& ground, const OrientedRectangle& sole) noexcept {
   const Vec2 ahead = unit_at(sole.yaw_rad), left = left_of(ahead);
   const Vec2 at_m = sole.centre_m - ground.corner_m;
+  const Vec2 reach_m = sole.half_length_m * ahead.cwiseAbs() + sole.half_width_m * left.cwiseAbs();
+  const std::int32_t first_x = GroundView::cell_of(at_m.x() - reach_m.x()),
+                     last_x = GroundView::cell_of(at_m.x() + reach_m.x());
+  const std::int32_t first_y = GroundView::cell_of(at_m.y() - reach_m.y()),
+                     last_y = GroundView::cell_of(at_m.y() + reach_m.y());
+  if (first_x < 0 || first_y < 0 || last_x >= GroundView::kSide_cells || last_y >= GroundView::kSide_cells)
+    return false;
+  // Mostly there is ground all about it.
+  const std::uint64_t about = GroundView::bits_of(first_x, last_x);
+  bool all = true;
+  for (std::int32_t y = first_y; y <= last_y; ++y)
+    all = all && (~ground.level[static_cast<std::size_t>(y)] & about) == 0;
+  if (all) return true;
   // Lines and points as near together as half a square miss none that the rectangle covers by more than a corner.
   constexpr double kStep_m = 0.5 * GroundView::kCell_m;
   const auto steps = [](double half_m) { return static_cast<std::int32_t>(std::ceil(2.0 * half_m / kStep_m)); };
@@ -19,7 +33,7 @@ bool LevelWalk::carries(const GroundView& ground, const OrientedRectangle& sole)
     for (std::int32_t j = 0; j <= across; ++j) {
       const Vec2 p_m = at_m + (2.0 * i / along - 1.0) * sole.half_length_m * ahead +
                        (2.0 * j / across - 1.0) * sole.half_width_m * left;
-      if (!GroundView::has(ground.level, ground.cell_of(p_m.x()), ground.cell_of(p_m.y()))) return false;
+      if (!GroundView::has(ground.level, GroundView::cell_of(p_m.x()), GroundView::cell_of(p_m.y()))) return false;
     }
   }
   return true;
@@ -28,11 +42,14 @@ bool LevelWalk::carries(const GroundView& ground, const OrientedRectangle& sole)
 double LevelWalk::clearance_m(const GroundView& ground, const Vec2& odom_p_m, double most_m) noexcept {
   const Vec2 at_m = odom_p_m - ground.corner_m;
   double least2_m2 = math::square(most_m);
-  const std::int32_t last_y = ground.cell_of(at_m.y() + most_m), last_x = ground.cell_of(at_m.x() + most_m);
-  for (std::int32_t y = ground.cell_of(at_m.y() - most_m); y <= last_y; ++y) {
-    for (std::int32_t x = ground.cell_of(at_m.x() - most_m); x <= last_x; ++x) {
-      const Vec2 middle_m = Vec2{x + 0.5, y + 0.5} * GroundView::kCell_m;
-      if (GroundView::has(ground.tall, x, y)) least2_m2 = std::min(least2_m2, (middle_m - at_m).squaredNorm());
+  const std::uint64_t about =
+      GroundView::bits_of(GroundView::cell_of(at_m.x() - most_m), GroundView::cell_of(at_m.x() + most_m));
+  const std::int32_t first_y = std::max(GroundView::cell_of(at_m.y() - most_m), 0);
+  const std::int32_t last_y = std::min(GroundView::cell_of(at_m.y() + most_m), GroundView::kSide_cells - 1);
+  for (std::int32_t y = first_y; y <= last_y; ++y) {
+    for (std::uint64_t tall = ground.tall[static_cast<std::size_t>(y)] & about; tall != 0; tall &= tall - 1) {
+      const Vec2 middle_m = Vec2{std::countr_zero(tall) + 0.5, y + 0.5} * GroundView::kCell_m;
+      least2_m2 = std::min(least2_m2, (middle_m - at_m).squaredNorm());
     }
   }
   return math::sqrt(least2_m2);
@@ -60,6 +77,11 @@ LevelWalk::Aim LevelWalk::aim(const TorsoPose& middle, const WalkGoal& goal) con
   return aim;
 }
 
+bool LevelWalk::has_arrived(const SolePair& soles, const WalkGoal& goal) const noexcept {
+  const TorsoPose to = aim(middle_of(soles), goal).pose;
+  return is_there(soles[0], Foot::kLeft, to) && is_there(soles[1], Foot::kRight, to);
+}
+
 LevelStep LevelWalk::next(const SolePair& soles, Foot last_swing, bool begins, const WalkGoal& goal,
                           const GroundView& ground) const noexcept {
   const TorsoPose middle = middle_of(soles);
@@ -68,6 +90,7 @@ LevelStep LevelWalk::next(const SolePair& soles, Foot last_swing, bool begins, c
   LevelStep step;
   // Of before the last step, from another level.
   if (!(std::abs(ground.height_m - middle.position_m.z()) < params_.level_m)) return step;
+  const double now_m = clearance_m(ground, middle.position_m.head<2>(), params_.body_m);
   if (is_there(Foot::kLeft) && is_there(Foot::kRight)) {
     step.outcome = LevelStep::Outcome::kArrived;
     return step;
@@ -79,7 +102,7 @@ LevelStep LevelWalk::next(const SolePair& soles, Foot last_swing, bool begins, c
   constexpr std::array kShares{1.0, 0.5, 0.25};
   constexpr std::array kAway_m{0.0, 0.1, 0.2, -0.1};
   for (const double share : kShares) {
-    if (try_step(soles, to, shortened(limits_, share), ground, step)) return step;
+    if (try_step(soles, to, shortened(limits_, share), ground, now_m, step)) return step;
   }
   const double turn_rad = math::wrap_angle(to.yaw_rad - middle.yaw_rad);
   if (!turns_first && std::abs(turn_rad) < params_.within_rad) return step;
@@ -90,15 +113,14 @@ LevelStep LevelWalk::next(const SolePair& soles, Foot last_swing, bool begins, c
       TorsoPose aside = middle;
       aside.position_m.head<2>() += away_m * unit_at(middle.yaw_rad);
       aside.yaw_rad += turn_share * turn_rad;
-      if (try_step(soles, aside, limits_, ground, step)) return step;
+      if (try_step(soles, aside, limits_, ground, now_m, step)) return step;
     }
   }
   return refused;
 }
 
 bool LevelWalk::try_step(const SolePair& soles, const TorsoPose& to, const FloorStepLimits& limits,
-                         const GroundView& ground, LevelStep& step) const noexcept {
-  const double now_m = clearance_m(ground, middle_of(soles).position_m.head<2>(), params_.body_m);
+                         const GroundView& ground, double now_m, LevelStep& step) const noexcept {
   const SolePose& stance = soles[index_of(other(step.foot))];
   FloorStepLimits of_foot = limits;
   if (side_sign(step.foot) * math::wrap_angle(to.yaw_rad - stance.yaw_rad) > 0.0) of_foot.turn_rad *= params_.turn_out;

@@ -61,6 +61,8 @@ class LevelWalk {
   // last_swing: the foot that stepped last. begins: none has yet, on this walk.
   [[nodiscard]] LevelStep next(const SolePair& soles, Foot last_swing, bool begins, const WalkGoal& goal,
                                const GroundView& ground) const noexcept;
+  // Both feet stand at the goal.
+  [[nodiscard]] bool has_arrived(const SolePair& soles, const WalkGoal& goal) const noexcept;
   // Ground was seen under all of the sole.
   [[nodiscard]] static bool carries(const GroundView& ground, const OrientedRectangle& sole) noexcept;
   // To the nearest square that rises; most_m where there is none as near.
@@ -73,9 +75,9 @@ class LevelWalk {
     bool turns_first;
   };
   [[nodiscard]] Aim aim(const TorsoPose& middle, const WalkGoal& goal) const noexcept;
-  // Of step.foot; false: its outcome says why not.
+  // Of step.foot; false: its outcome says why not. now_m: clearance of the body as it stands.
   [[nodiscard]] bool try_step(const SolePair& soles, const TorsoPose& to, const FloorStepLimits& limits,
-                              const GroundView& ground, LevelStep& step) const noexcept;
+                              const GroundView& ground, double now_m, LevelStep& step) const noexcept;
 
   const LevelWalkParams& params_;
   const SoleModel& sole_;

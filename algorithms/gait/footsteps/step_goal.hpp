@@ -8,7 +8,7 @@
 namespace polygmap {
 
 enum class StepKind : std::uint8_t {
-  kFloor,     // while walking up
+  kFloor,     // on level ground
   kLeading,   // the first foot onto the next tread
   kTrailing,  // the second, beside it
   kPassing,   // or past it onto the tread beyond
@@ -18,7 +18,7 @@ enum class StepKind : std::uint8_t {
   return kind == StepKind::kFloor || kind == StepKind::kClosing;
 }
 [[nodiscard]] constexpr bool onto_tread(StepKind kind) noexcept { return kind != StepKind::kFloor; }
-// It lands higher than the other foot stands, and the weight goes on to it.
+// It lands on another level than the other foot stands on, and the weight goes on to it.
 [[nodiscard]] constexpr bool leads(StepKind kind) noexcept {
   return kind == StepKind::kLeading || kind == StepKind::kPassing;
 }

@@ -61,7 +61,8 @@ class BodyPlan {
   }
   [[nodiscard]] double heel_up_rad(Foot foot) const noexcept { return heel_up_rad_[index_of(foot)]; }
   [[nodiscard]] bool is_on_toe(Foot foot) const noexcept { return heel_up_rad_[index_of(foot)] > 0.0; }
-  void leave_ground(Foot foot) noexcept { heel_up_rad_[index_of(foot)] = 0.0; }
+  // Its sole is planned as it stands so; 0 in the air.
+  void stand_on_toe(Foot foot, double heel_up_rad) noexcept { heel_up_rad_[index_of(foot)] = heel_up_rad; }
   void restart_posture() noexcept { posture_.restart(); }
 
   // The foot stands where it is planned to be, early_m above its target, and is held there in odometry.

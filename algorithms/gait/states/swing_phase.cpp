@@ -43,7 +43,8 @@ void SwingPhase::begin(const GaitInput& in, GaitShared& gait, const ClimbPlanner
       .odom_T_executed = {}};
   gait.status.phase = GaitPhase::kSwing;
   gait.status.stands[index_of(goal_.foot)] = false;
-  body.leave_ground(goal_.foot);
+  heel_up_rad_ = body.heel_up_rad(goal_.foot);
+  body.stand_on_toe(goal_.foot, 0.0);
   gait.memory.shifts = gait.memory.idle_ticks = gait.memory.obstacle_ticks = gait.memory.refusals = 0;
   gait.memory.rests_first = false;
   body.release_landed_foot();
@@ -139,7 +140,7 @@ Transition SwingPhase::tick(const GaitInput& in, GaitShared& gait) noexcept {
     ++gait.status.late_contacts;
     timing_.retreat(params.timing);
     gait.plan.restart_posture();
-    wait_over_stance(gait, sole_pose(gait.plan.plan_T_odom() * path_.at(0)));
+    wait_over_stance(gait, start_flat(gait));
     return {};
   }
   // The ground is late: the leg is to reach farther down.
@@ -173,7 +174,7 @@ void SwingPhase::follow(const GaitInput& in, GaitShared& gait) noexcept {
                        : reaches_back    ? params.abort_share * path_.duration_ticks()
                        : reaches_shortly ? params.abort_passing_ticks
                                          : 0.0;
-  // Back down to a lower tread the body topples, which is on its way up: on it goes where that takes no longer.
+  // Back to another tread the body topples, which is on its way from there: on it goes where that takes no longer.
   const double stop_until = in.stop_requested != StopReason::kOperator ? 0.0
                             : reaches_back                             ? params.abort_passing_ticks
                                                                        : path_.duration_ticks() - params.stop_ticks;
@@ -195,7 +196,7 @@ void SwingPhase::follow(const GaitInput& in, GaitShared& gait) noexcept {
   turn_tick_ = std::max(turn_tick_, timing_.tick());  // the pace takes some ticks to turn, too
   if (went_back) return;
   // The body was on its way up and ahead, to a target where no foot will stand.
-  wait_over_stance(gait, sole_pose(gait.plan.plan_T_odom() * path_.at(0)));
+  wait_over_stance(gait, start_flat(gait));
 }
 
 // Of a passing foot, the rest of the way straight to the target, or beside the standing foot while it is still behind
@@ -260,6 +261,7 @@ Transition SwingPhase::abort_swing(const GaitInput& in, GaitShared& gait) noexce
     return {};
   }
   stop_foot(in, gait);
+  gait.plan.stand_on_toe(goal_.foot, heel_up_rad_);  // as it stood; the heel comes down from there
   if (!felt && std::isfinite(in.feedback.foot_force_n[index_of(goal_.foot)])) gait.plan.keep_upright();
   ++gait.status.aborted_swings;
   gait.planner.swing_aborted();
@@ -294,6 +296,11 @@ void SwingPhase::stop_foot(const GaitInput& in, GaitShared& gait) const noexcept
   gait.status.stands[index_of(goal_.foot)] = true;
   if (!in.leg_impaired) return;
   gait.plan.set_sole(goal_.foot, gait.plan.plan_T_base() * in.joints.base_T_sole_reference(goal_.foot));
+}
+
+// Where the foot stood, flat, plan frame.
+SolePose SwingPhase::start_flat(const GaitShared& gait) const noexcept {
+  return sole_pose(gait.plan.plan_T_odom() * path_.at(0) * turned_about_toe(gait.robot.sole, -heel_up_rad_));
 }
 
 // As low as the sole asks for, plan frame, and the standing one allows.

@@ -34,6 +34,7 @@ class SwingPhase {
   [[nodiscard]] Transition abort_swing(const GaitInput& in, GaitShared& gait) noexcept;
   [[nodiscard]] Transition touch_down(const GaitInput& in, GaitShared& gait, bool felt, double early_m) noexcept;
   void stop_foot(const GaitInput& in, GaitShared& gait) const noexcept;
+  [[nodiscard]] SolePose start_flat(const GaitShared& gait) const noexcept;
   [[nodiscard]] Transform beside_path(const BodyPlan& plan, const Transform& odom_T_sole) const noexcept;
   void land_soon(GaitShared& gait) noexcept;
   void land_beside(GaitShared& gait, const SolePose& target) noexcept;
@@ -47,6 +48,7 @@ class SwingPhase {
   Vec2 zmp_stance_m_ = Vec2::Zero();     // plan frame
   Vec3 odom_off_path_m_ = Vec3::Zero();  // horizontally, from where the path begins to where the foot stood
   double turn_tick_ = 0.0;               // of the path, where the foot turned back
+  double heel_up_rad_ = 0.0;             // as it lifted off
   TouchEvidence touch_;
   EarlyTouch early_touch_;
   std::int64_t felt_stamp_ns_ = 0;   // of the last sample in it

@@ -10,9 +10,6 @@ namespace {
 
 constexpr int kClosings = 4;
 
-[[nodiscard]] std::int32_t cell_of(double along_m) noexcept {
-  return static_cast<std::int32_t>(std::floor(along_m / GroundView::kCell_m));
-}
 [[nodiscard]] double middle_of_cell_m(std::int32_t cell) noexcept { return (cell + 0.5) * GroundView::kCell_m; }
 [[nodiscard]] std::int32_t mm_of(double m) noexcept {
   return static_cast<std::int32_t>(std::floor(1e3 * math::clamp(m, -30.0, 30.0) + 0.5));
@@ -34,8 +31,8 @@ void GroundMap::each_cell_under(std::size_t foot, double grown_m, auto&& visit) 
   const PlanFrame& plan = soles_[foot];
   const double reach_m = std::max(view_.sole.toe_x_m, -view_.sole.heel_x_m) + view_.sole.half_width_m + grown_m;
   const Vec2& p_m = plan.origin_m();
-  for (std::int32_t y = cell_of(p_m.y() - reach_m); y <= cell_of(p_m.y() + reach_m); ++y) {
-    for (std::int32_t x = cell_of(p_m.x() - reach_m); x <= cell_of(p_m.x() + reach_m); ++x) {
+  for (std::int32_t y = GroundView::cell_of(p_m.y() - reach_m); y <= GroundView::cell_of(p_m.y() + reach_m); ++y) {
+    for (std::int32_t x = GroundView::cell_of(p_m.x() - reach_m); x <= GroundView::cell_of(p_m.x() + reach_m); ++x) {
       const Vec2 in_sole_m = plan({middle_of_cell_m(x), middle_of_cell_m(y)});
       if (in_sole_m.x() > view_.sole.toe_x_m + grown_m || in_sole_m.x() < view_.sole.heel_x_m - grown_m) continue;
       if (std::abs(in_sole_m.y()) <= view_.sole.half_width_m + grown_m) visit(x, y);
@@ -61,8 +58,8 @@ void GroundMap::begin(const View& view) noexcept {
   }
   height_mm_ = mm_of(lowest_m);
   const Vec2 middle_m = 0.5 * (view_.map_T_sole[0].p_m + view_.map_T_sole[1].p_m).head<2>();
-  first_x_ = cell_of(middle_m.x()) - GroundView::kSide_cells / 2;
-  first_y_ = cell_of(middle_m.y()) - GroundView::kSide_cells / 2;
+  first_x_ = GroundView::cell_of(middle_m.x()) - GroundView::kSide_cells / 2;
+  first_y_ = GroundView::cell_of(middle_m.y()) - GroundView::kSide_cells / 2;
   const bool begins = !std::exchange(has_begun_, true);
   own_.fill(0);
   for (std::size_t foot = 0; foot < kFootCount; ++foot) {
@@ -110,7 +107,7 @@ bool GroundMap::look() noexcept {
 }
 
 void GroundMap::see(const Vec3& map_p_m) noexcept {
-  const std::int32_t x = cell_of(map_p_m.x()), y = cell_of(map_p_m.y());
+  const std::int32_t x = GroundView::cell_of(map_p_m.x()), y = GroundView::cell_of(map_p_m.y());
   if (std::abs(x) > 30'000 || std::abs(y) > 30'000) return;
   // A foot is where the legs say within some centimetres, and so is the shin above it.
   if (GroundView::has(own_, x - first_x_, y - first_y_)) return;
@@ -142,7 +139,7 @@ void GroundMap::look_through(const Vec3& map_p_m) noexcept {
   if (!(share > 0.0)) return;
   work_.add(60);
   const Vec2 through_m = (eye_m + share * (map_p_m - eye_m)).head<2>();
-  const std::int32_t x = cell_of(through_m.x()), y = cell_of(through_m.y());
+  const std::int32_t x = GroundView::cell_of(through_m.x()), y = GroundView::cell_of(through_m.y());
   Cell& cell = at(x, y);
   const bool is_level = knows(cell, x, y) && std::abs(cell.height_mm - height_mm_) <= mm_of(params_.level_m);
   if (is_level && !GroundView::has(own_, x - first_x_, y - first_y_)) --cell.count;

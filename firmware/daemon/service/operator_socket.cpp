@@ -22,7 +22,7 @@
 namespace polygmap::daemon {
 namespace {
 
-constexpr std::size_t kMostAsked_bytes = 64;
+constexpr std::size_t kMostAsked_bytes = 128;  // a go_to in full precision and its time are 101
 constexpr std::int64_t kDrop_ns = 500'000'000;
 constexpr std::string_view kNoTime = "refused: its time is missing, CLOCK_MONOTONIC in ns, as polygmapd --ask sends it";
 constexpr std::string_view kTooOld = "refused: it was not heard within half a second";

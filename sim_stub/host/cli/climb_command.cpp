@@ -11,6 +11,7 @@
 #include <optional>
 #include <ostream>
 
+#include "firmware/config/operator_request_text.hpp"
 #include "firmware/config/param_file.hpp"
 #include "firmware/live/live_display.hpp"
 #include "sim_stub/host/cli/can_command.hpp"
@@ -122,9 +123,8 @@ void declare_operator(CLI::App& climb, ClimbArguments& a) {
                      "Nothing starts by itself: keys arm, start, pause and stop it, at the wall clock's speed");
   climb
       .add_option("--ask", a.ask,
-                  "The same by a script: arm, start, pause, resume, stop, reset or hand_over, and at which simulated "
-                  "second, as in "
-                  "pause@12.5")
+                  "The same by a script: one of " + std::string(kWhatMayBeAsked) +
+                      "; and at which simulated second, as in pause@12.5")
       ->expected(1, 64)
       ->excludes(keys)
       ->type_name("WHAT@S");
@@ -346,7 +346,8 @@ std::string operator_complaint(ClimbArguments& a) {
     }
     a.options.asked.push_back(request);
   }
-  if (!a.options.params.supervisor.autostart && !a.keyboard && a.options.asked.empty()) {
+  const bool is_sent = a.options.world && a.options.world->world.goal;  // which arms it, too
+  if (!a.options.params.supervisor.autostart && !a.keyboard && a.options.asked.empty() && !is_sent) {
     return "Parameter file \"" + a.options.params_file +
            "\" switches supervisor.autostart off, and there is no --operator and no --ask: it would never arm.";
   }

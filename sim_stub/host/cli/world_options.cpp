@@ -3,8 +3,10 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <optional>
 #include <vector>
 
+#include "firmware/config/file_error.hpp"
 #include "sim_stub/host/cli/command_words.hpp"
 #include "sim_stub/host/output_file.hpp"
 #include "sim_stub/world/kinds/kinds.hpp"
@@ -14,6 +16,16 @@ namespace {
 
 WorldPlan plan_of(const ClimbOptions& options) {
   return draw_world(*std::ranges::find(world_kinds(), options.world_kind, &WorldKind::name), options.seed);
+}
+
+// The robot could not be sent to a goal beyond that. Throws config::FileError.
+void check_goal(const ClimbOptions& options) {
+  const std::optional<Destination> goal = destination_in(*options.world);
+  if (!goal || goal->is_valid()) return;
+  throw config::FileError(config::FileName{"world", options.world_file}.text() + ": its goal is " +
+                          number(goal->ahead_m) + " m ahead and " + number(goal->left_m) +
+                          " m to the left of where the robot starts, and go_to takes " +
+                          number(Destination::kFarthest_m) + " m at most, each way.");
 }
 
 }  // namespace
@@ -52,12 +64,14 @@ std::string take_world(const CLI::App& climb, ClimbOptions& options) {
   }
   if (options.world_kind.empty()) {
     options.world = read_world(options.world_file);
+    check_goal(options);
     return {};
   }
   const WorldPlan plan = plan_of(options);
   options.world_file = options.out_dir + "/world.toml";
   options.world_drawn = plan.what;
   options.world = parse_world(options.world_file, to_toml(plan));
+  check_goal(options);
   return {};
 }
 

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "algorithms/robot/robot_model.hpp"
+#include "firmware/config/operator_request_text.hpp"
 
 namespace polygmap::sim {
 namespace {
@@ -65,7 +66,7 @@ Json pushes_json(const std::vector<Push>& pushes) {
 
 Json asked_json(const std::vector<TimedRequest>& asked) {
   Json list = Json::array();
-  for (const TimedRequest& one : asked) list.push_back({{"at_s", one.at_s}, {"command", name_of(one.request.command)}});
+  for (const TimedRequest& one : asked) list.push_back({{"at_s", one.at_s}, {"command", text_of(one.request)}});
   return list;
 }
 

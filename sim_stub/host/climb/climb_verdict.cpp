@@ -13,11 +13,11 @@ std::string sentence(const char* format, double a = 0.0, double b = 0.0, double 
   return buffer;
 }
 
-// With the rise or tread that was measured, where one is behind the reason.
+// With the rise, drop or tread that was measured, where one is behind the reason.
 std::string why_stopped(StopReason reason, double measured_m) {
   const std::string why(text_of(reason));
-  const bool of_a_length =
-      reason == StopReason::kRiseTooHigh || reason == StopReason::kTreadTooShort || reason == StopReason::kLegsCannot;
+  const bool of_a_length = reason == StopReason::kRiseTooHigh || reason == StopReason::kDropTooDeep ||
+                           reason == StopReason::kTreadTooShort || reason == StopReason::kLegsCannot;
   return of_a_length && measured_m > 0.0 ? why + sentence(" (%.3f m)", measured_m) : why;
 }
 
@@ -31,6 +31,19 @@ std::string why_ended_early(const std::string& climbed, const ClimbEnding& endin
     return "No command was to come after " + climbed + ", and the module waited for one; its state was " + state + ".";
   }
   return "Time ran out after " + climbed + ".";
+}
+
+// To a place: to the world's goal where nobody else asks, else by the last who said where to.
+bool was_sent(const ClimbOptions& options) {
+  if (options.climb_operator == nullptr) return options.world && options.world->world.goal;
+  bool sent = false;
+  for (const TimedRequest& one : options.asked) {
+    const OperatorCommand command = one.request.command;
+    if (command == OperatorCommand::kGoTo || command == OperatorCommand::kStart) {
+      sent = command == OperatorCommand::kGoTo;
+    }
+  }
+  return sent;
 }
 
 // A staircase's top; a world file's goal, or, without one, where the module says that it has ended.
@@ -98,10 +111,9 @@ std::string reason_of(const ClimbSummary& s, const ClimbEnding& ending) {
   // A step counts where both soles rest inside its edges, so a sole over one may be why the count is short.
   if (!all_climbed && ending.phase == GaitPhase::kFinished) {
     if (over) return over_the_edge + "; " + climbed + " count.";
-    if (s.options.world && s.options.world->world.goal) {
-      return "The module ended after " + climbed + ": it took the place where it stood for its goal.";
+    if (was_sent(s.options)) {
+      return "The module ended after " + climbed + ": it took the place where it stood for the one it was sent to.";
     }
-    if (s.options.world) return "The module ended after " + climbed + ": it saw nothing higher, and knows of no goal.";
     return "The module ended the climb after " + climbed + ": " + why_stopped(StopReason::kTop, 0.0) + ".";
   }
   if (!all_climbed) return why_ended_early(climbed, ending);

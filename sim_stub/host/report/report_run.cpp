@@ -6,6 +6,7 @@
 
 #include "algorithms/geometry/convex.hpp"
 #include "algorithms/geometry/oriented_rectangle.hpp"
+#include "firmware/config/operator_request_text.hpp"
 #include "sim_stub/host/record/preview_camera.hpp"
 #include "sim_stub/host/record/zstd_chunks.hpp"
 
@@ -109,7 +110,7 @@ void ReportRun::take_call(const PortCall& call, std::int64_t cycle_ns) {
   if (!call.gave) return;
   if (call.kind == CallKind::kReadJoints) joints_ = call.joints;
   if (call.kind == CallKind::kReadOperator) {
-    operator_.push_back({rounded(time_s(cycle_ns), 3), name_of(call.asked.command)});
+    operator_.push_back({rounded(time_s(cycle_ns), 3), text_of(call.asked)});
   }
   if (call.kind == CallKind::kReadLidar) {
     const Transform lio_T_base = call.lio.lio_T_lidar * file_->params().robot.mounts.base_T_lidar.inverse();

@@ -28,6 +28,28 @@ TEST(OperatorRequestText, PlaceWithAndWithoutAHeading_IsReadInMetresAndDegrees) 
   EXPECT_FALSE(any->destination.has_turn);
 }
 
+TEST(OperatorRequestText, Printed_IsWhatCanBeTypedAgain) {
+  for (const std::string_view text :
+       {"arm", "hand_over", "go_to=1.2,0.5,90", "go_to=0,-50", "go_to=0.1,1e-05,30", "go_to=1.5,0,-183",
+        "go_to=12.345678901234567,-0.3333333333333333,57.295779513082", "go_to=0,0,0"}) {
+    const auto request = operator_request_of(text);
+    ASSERT_TRUE(request) << text;
+    EXPECT_EQ(text_of(*request), text);
+  }
+  for (const double turn_rad : {kPi, -1.0, 1e-9, 3.2 / 7.0}) {
+    const auto again = operator_request_of(text_of(OperatorRequest(Destination{0.0, 0.0, turn_rad, true})));
+    ASSERT_TRUE(again) << turn_rad;
+    EXPECT_DOUBLE_EQ(again->destination.turn_rad, turn_rad);
+  }
+}
+
+// --ask tells them to who asked for too much.
+TEST(OperatorRequestText, WhatMayBeAsked_NamesBoundsThatHold) {
+  EXPECT_NE(kWhatMayBeAsked.find("metres (50 at most) and degrees (183 at most)"), std::string_view::npos);
+  EXPECT_TRUE(operator_request_of("go_to=50,-50,183"));
+  EXPECT_FALSE(operator_request_of("go_to=50,-50,184"));
+}
+
 TEST(OperatorRequestText, WhatIsNoRequest_IsRefused) {
   for (const std::string_view text :
        {"", "go_to", "go_to=", "go_to=1", "go_to=1,", "go_to=1,2,", "go_to=1,2,3,4", "go_to=1;2", "go_to=a,b",

@@ -11,6 +11,7 @@
 #include <ctime>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <thread>
 
 #include "tests/support/port_contract.hpp"
@@ -139,6 +140,20 @@ TEST(OperatorSocketTest, FormerRunLeftItsSocket_IsReplaced) {
   ::close(fd);
   OperatorSocket socket;
   EXPECT_EQ(socket.open(path), "");
+}
+
+TEST(OperatorSocketTest, PlaceInFullPrecision_IsHeardWhole) {
+  const std::string path = path_of("precise");
+  OperatorSocket socket;
+  ASSERT_EQ(socket.open(path), "");
+  const Client client(path);
+  const std::int64_t now_ns = std::numeric_limits<std::int64_t>::max() / 2;
+  client.send("go_to=-1.2345678901234567e-100,-12.345678901234567,-123.45678901234567 " + std::to_string(now_ns) +
+              "\n");
+  socket.serve(ModuleState::kStanding, now_ns);
+  OperatorRequest request;
+  ASSERT_TRUE(socket.try_read(request)) << client.heard();
+  EXPECT_EQ(request.destination.left_m, -12.345678901234567);
 }
 
 // The daemon's thread was held up while the word lay in the socket; whoever asked has gone by then.

@@ -252,6 +252,7 @@ TEST(Link, SentToAPlace_WalksThereAndEnds) {
   EXPECT_EQ(polygmap_go_to(nullptr, 0.0, 0.0, nan), POLYGMAP_E_NULL);
   EXPECT_EQ(polygmap_go_to(linked.module(), 51.0, 0.0, nan), POLYGMAP_E_PLACE);
   EXPECT_EQ(polygmap_go_to(linked.module(), nan, 0.0, 0.0), POLYGMAP_E_PLACE);
+  EXPECT_EQ(polygmap_go_to(linked.module(), 1.0, 0.0, 3.3), POLYGMAP_E_PLACE);
   EXPECT_EQ(polygmap_operate(linked.module(), POLYGMAP_OPERATE_GO_TO), POLYGMAP_E_OPERATE) << "it names no place";
   EXPECT_EQ(polygmap_go_to(linked.module(), -0.02, 0.0, nan), POLYGMAP_OK);
   for (int i = 0; i < 3000 && linked.status().state != POLYGMAP_STATE_ON_TOP; ++i) linked.tick();

@@ -80,6 +80,11 @@ TEST(ClimbCommand, AutostartOff_TakesAnOperator) {
   std::ofstream(path) << "[supervisor]\nautostart = false\n";
   expect_refused({"climb", "--params", path}, "supervisor.autostart");
   EXPECT_EQ(call({"climb", "--params", path, "--ask", "arm@1"}).code, 0);
+  EXPECT_EQ(call({"climb", "--params", path, "--kind", "up"}).code, 0) << "who sends it to the goal arms it";
+  const std::string world = temporary("autostart_world.toml");
+  std::ofstream(world) << "[start]\nx = 0\ny = 0\nyaw_deg = 0\nsurface = \"floor\"\n";
+  expect_refused({"climb", "--params", path, "--world", world}, "supervisor.autostart");
+  std::filesystem::remove(world);
   std::filesystem::remove(path);
 }
 
@@ -466,6 +471,21 @@ TEST(ClimbCommand, Kind_IsDrawnByTheSeedAndWrittenForWorldToRead) {
     }
   }
   EXPECT_EQ(read_world(out + "/world.toml").world.is_staircase, false);
+}
+
+// Seen from the start, which looks along y here.
+TEST(ClimbCommand, World_WhoseGoalIsTooFarToBeSentTo_IsRefused) {
+  const std::string path = temporary("far_goal.toml");
+  const auto with_goal = [&path](const std::string& x, const std::string& y) {
+    std::ofstream(path) << "[start]\nx = 10\ny = 0\nyaw_deg = 90\nsurface = \"floor\"\n[goal]\nx = " << x
+                        << "\ny = " << y << "\nsurface = \"floor\"\n";
+    return std::vector<std::string>{"climb", "--world", path};
+  };
+  EXPECT_EQ(call(with_goal("-39.5", "49.5")).code, 0);
+  const std::string bound = " m to the left of where the robot starts, and go_to takes 50 m at most, each way.";
+  expect_refused(with_goal("9", "60.5"), "far_goal.toml\": its goal is 60.5 m ahead and 1" + bound);
+  expect_refused(with_goal("70", "-3"), "far_goal.toml\": its goal is -3 m ahead and -60" + bound);
+  std::filesystem::remove(path);
 }
 
 TEST(ClimbCommand, Kind_ThatCannotBe_IsRefused) {

@@ -1,6 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
+#include <ostream>
+#include <string>
+#include <vector>
+
+#include "sim_stub/host/climb/climb_verdict.hpp"
 #include "tests/support/scripted_climb.hpp"
 
 namespace polygmap::sim {
@@ -45,6 +50,46 @@ TEST(ClimbVerdict, ModuleStopped_NamesWhatItMeasured) {
             "The module stopped after 0 of 2 steps: the next surface that it saw was too high to step on (0.498 m).");
   EXPECT_TRUE(std::isnan(s.climb_time_s));
   EXPECT_TRUE(std::isnan(s.swing_clearance_min_m));  // nothing swung
+}
+
+TEST(ClimbVerdict, StoppedBeforeADrop_NamesItsDepth) {
+  ScriptedClimb climb(plain_stairs(2));
+  climb.wait(100 * kNsPerMs);
+  climb.gait.phase = GaitPhase::kStopped;
+  climb.gait.stop_reason = StopReason::kDropTooDeep;
+  climb.gait.stop_measured_m = 0.451;
+  climb.tick();
+  EXPECT_EQ(climb.finish().stop_sentence, "the next surface that it saw was too far down to step on (0.451 m)");
+}
+
+// It has ended by itself, 2 m from the world's goal.
+std::string reason_where_it_ended(const std::vector<TimedRequest>& asked, ClimbOperator* climb_operator) {
+  ClimbSummary s;
+  s.options.world.emplace().world.goal.emplace();
+  s.options.asked = asked;
+  s.options.climb_operator = climb_operator;
+  s.route.goal_reached = false;
+  s.route.goal_distance_m = 2.0;
+  s.route.surfaces_stood_on = {"floor"};
+  ClimbEnding ending;
+  ending.phase = GaitPhase::kFinished;
+  judge(s, ending);
+  EXPECT_FALSE(s.pass);
+  return s.reason;
+}
+
+TEST(ClimbVerdict, EndedFarFromTheGoal_SaysWhatItWasToldToDo) {
+  std::ostream nobody(nullptr);
+  ScriptedOperator script({}, nobody);
+  const std::string after = " after 0 footsteps, on \"floor\", 2.00 m from the goal: it took ";
+  const std::string sent = "The module ended" + after + "the place where it stood for the one it was sent to.";
+  const std::string climbs = "The module ended the climb" + after + "the tread it stood on for the highest.";
+  const TimedRequest start{4.0, OperatorCommand::kStart},
+      go_to{5.0, OperatorRequest(Destination{1.0, 0.0, 0.0, false})};
+  EXPECT_EQ(reason_where_it_ended({}, nullptr), sent) << "to the world's goal";
+  EXPECT_EQ(reason_where_it_ended({start, go_to}, &script), sent);
+  EXPECT_EQ(reason_where_it_ended({go_to, start}, &script), climbs);
+  EXPECT_EQ(reason_where_it_ended({}, &script), climbs) << "by keys, which send it nowhere";
 }
 
 TEST(ClimbVerdict, ImuAndLegsDisagree_SaysWhatToSuspect) {
