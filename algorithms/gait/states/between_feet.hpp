@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The body settles between its feet and stays there.
+// The body settles between its feet and stays there; where an ankle has not the range for that, nearer to the upper
+// foot.
 #pragma once
 
 #include "algorithms/gait/states/crouch.hpp"
@@ -15,6 +16,12 @@ class BetweenFeet {
   [[nodiscard]] std::int32_t tick() const noexcept { return tick_; }  // since it set out
 
  private:
+  struct Rest {
+    TorsoPose base;
+    Vec2 com_m;
+  };
+  // Plan frame.
+  [[nodiscard]] Rest rest(const GaitShared& gait, const TorsoParams& torso) const noexcept;
   void rise(GaitShared& gait) noexcept;
 
   Crouch crouch_;

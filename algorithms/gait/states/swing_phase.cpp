@@ -176,6 +176,7 @@ void SwingPhase::follow(const GaitInput& in, GaitShared& gait) noexcept {
                                          : 0.0;
   // Back to another tread the body topples, which is on its way from there: on it goes where that takes no longer.
   const double stop_until = in.stop_requested != StopReason::kOperator ? 0.0
+                            : heel_up_rad_ > 0.0                       ? 0.0  // down after the other one, on it goes
                             : reaches_back                             ? params.abort_passing_ticks
                                                                        : path_.duration_ticks() - params.stop_ticks;
   const bool went_back = timing_.goes_back();

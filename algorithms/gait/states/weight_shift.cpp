@@ -30,7 +30,12 @@ void WeightShift::begin(const GaitInput& in, GaitShared& gait, const ClimbPlanne
 
 Transition WeightShift::tick(const GaitInput& in, GaitShared& gait) noexcept {
   const WeightShiftParams& params = gait.params.weight_shift;
-  const bool ends = in.stop_requested != StopReason::kNone || in.lost || !in.may_step;
+  // Once its heel is up a rear foot follows the other one down, though the operator asks to stop or to pause: on the
+  // way back its ankle would bend farther than it can.
+  const bool must_end =
+      in.lost || (in.stop_requested != StopReason::kNone && in.stop_requested != StopReason::kOperator);
+  const bool is_asked = in.stop_requested == StopReason::kOperator || !in.may_step;
+  const bool ends = must_end || (is_asked && !gait.plan.is_on_toe(decision_.goal.foot));
   if (ends || in.since_last_ns > params.max_gap_ns) return Transition::stand();
   if (search_.step(gait.robot, gait.params.step) == StepSearch::State::kImpossible) return legs_cannot(in, gait);
   if (tick_ < shift_ticks_ || search_.state() != StepSearch::State::kFound || !in.usable) return {};

@@ -80,6 +80,8 @@ struct StepDownParams {
   double turn_rad = 0.35;
   double com_above_base_m = 0.09;
   double leave_m = 0.008;
+  double rest_margin_rad = 0.1;
+  double rest_share = 0.2;
   HeelRiseParams heel_rise;
 
   static void visit(auto& p, auto& field) {
@@ -100,6 +102,10 @@ struct StepDownParams {
           "A foot that walks ahead to a place goes by this farther ahead as it lifts: a riser that it came down may be "
           "at its "
           "heel.");
+    field("rest_margin_rad", p.rest_margin_rad, 0.0, 0.5,
+          "At rest between two levels it stands amid its feet where that keeps so much from the joints' ranges.");
+    field("rest_share", p.rest_share, 0.0, 0.5,
+          "Else it leans, and stands as near to the upper foot: 0 over it, 0.5 amid them.");
     field("heel_rise", p.heel_rise);
   }
 };
