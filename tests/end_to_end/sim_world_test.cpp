@@ -3,8 +3,12 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <filesystem>
+#include <sstream>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "sim_stub/host/climb/climb.hpp"
 #include "sim_stub/host/report/report_run.hpp"
@@ -13,11 +17,15 @@
 namespace polygmap::sim {
 namespace {
 
-ClimbSummary climb(const std::string& world, std::uint64_t seed, const std::string& recording = "") {
+ClimbOptions in_world(const std::string& world, std::uint64_t seed) {
   ClimbOptions options;
   options.seed = seed;
-  options.recording = recording;
   options.world = parse_world("world.toml", world);
+  return options;
+}
+ClimbSummary climb(const std::string& world, std::uint64_t seed, const std::string& recording = "") {
+  ClimbOptions options = in_world(world, seed);
+  options.recording = recording;
   return run_climb(options, {});
 }
 
@@ -61,6 +69,43 @@ TEST(WorldClimb, GoalBelowAnEdge_IsReachedDownTheStep) {
   EXPECT_TRUE(s.pass) << s.reason;
   EXPECT_EQ(s.route.surfaces_stood_on, (std::vector<std::string>{"floor", "block", "floor"}));
   EXPECT_GT(s.sole_margin_min_m, 0.004);
+}
+
+// From a block down to a place on the floor; stop_s: 0, nobody stops it.
+ClimbSummary climb_down(double stop_s) {
+  std::vector<TimedRequest> asked{{1.0, OperatorCommand::kArm},
+                                  {3.0, OperatorCommand::kStart},
+                                  {4.0, OperatorRequest{Destination{.ahead_m = 1.8}}}};
+  if (stop_s > 0.0) asked.push_back({stop_s, OperatorCommand::kStop});
+  std::ostringstream said;
+  ScriptedOperator script(asked, said);
+  ClimbOptions options = in_world("[start]\nx = 0.7\ny = 0\nyaw_deg = 0\nsurface = \"block\"\n" +
+                                      solid("block", 0.0, 1.5, 0.13) + "[goal]\nx = 2.5\ny = 0\nsurface = \"floor\"\n",
+                                  2);
+  options.climb_operator = &script;
+  options.asked = asked;
+  return run_climb(options, {});
+}
+TEST(WorldClimb, StoppedOnTheWayDownAStep_StandsOnBothFeet) {
+  const ClimbSummary whole = climb_down(0.0);
+  ASSERT_TRUE(whole.pass) << whole.reason;
+  const auto lifts = std::find_if(whole.states.begin(), whole.states.end(),
+                                  [](const StateChange& change) { return change.state == ModuleState::kClimbing; });
+  ASSERT_NE(lifts, whole.states.end());
+  // In the leading swing, after which an ankle has not the range for a body amid both feet; with the heel of the rear
+  // foot up; and as it swings.
+  for (const double after_s : {0.5, 1.7, 2.1}) {
+    const ClimbSummary s = climb_down(lifts->at_s + after_s);
+    EXPECT_FALSE(s.fell) << after_s << ": " << s.reason;
+    EXPECT_EQ(s.states.back().state, ModuleState::kSafeStop) << after_s;
+    EXPECT_EQ(s.route.surfaces_stood_on, (std::vector<std::string>{"block", "floor"})) << after_s;
+    EXPECT_GT(s.swing_clearance_min_m, 0.005) << after_s;
+    const double landed_m = s.footsteps.back().true_T_landed.p_m.z();
+    const double before_m = s.footsteps[s.footsteps.size() - 2].true_T_landed.p_m.z();
+    if (after_s < 1.0) {
+      EXPECT_NEAR(before_m - landed_m, 0.13, 0.02) << "between two levels";
+    }
+  }
 }
 
 TEST(WorldClimb, GoalBehindADeepDrop_StopsBeforeTheEdgeAndSaysWhy) {
