@@ -34,6 +34,35 @@ GaitStair::GaitStair() {
   }
 }
 
+WalkAtAWall::WalkAtAWall() {
+  constexpr std::size_t kTicks = 5000;
+  test::IdealClimb climb({.stairs = {}, .distance_m = 5.0});
+  climb.gait().go_to({.ahead_m = 2.0});
+  GroundView ground;
+  ground.corner_m = Vec2::Constant(-0.5 * GroundView::kSide_cells * GroundView::kCell_m);
+  ground.level.fill(~std::uint64_t{0});
+  GaitTick seen;
+  climb.tamper = [&](StateEstimate& state, FootholdSet& footholds, JointFeedback& feedback) {
+    if (climb.record().ticks == 0) {  // right across all of the view, 0.3 m ahead
+      ground.corner_m += state.odom_T_base.p_m.head<2>();
+      ground.height_m = 0.5 * (state.odom_T_sole[0].p_m.z() + state.odom_T_sole[1].p_m.z());
+      const auto column = static_cast<std::uint32_t>(GroundView::kSide_cells / 2 + GroundView::cell_of(0.30));
+      ground.tall.fill(std::uint64_t{3} << column);
+      for (std::uint64_t& row : ground.level) row &= ~(std::uint64_t{3} << column);
+    }
+    footholds = {};
+    footholds.map_stamp_ns = state.stamp_ns;
+    footholds.obstruction = StopReason::kNoStaircase;
+    footholds.ground = ground;
+    seen = {state.stamp_ns, state, footholds, feedback, false};
+  };
+  start.gait = climb.gait();
+  while (ticks.size() < kTicks && climb.tick()) {
+    seen.swings = climb.status().phase == GaitPhase::kSwing;
+    ticks.push_back(seen);
+  }
+}
+
 StairPlan::StairPlan() {
   for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
     const std::size_t f = index_of(foot);
@@ -62,6 +91,12 @@ void stage_gait_swing_tick(GaitBench& bench, const GaitTick& tick) {
 }
 void stage_gait_shift_tick(GaitBench& bench, const GaitTick& tick) {
   bench.gait.tick(tick.now_ns, tick.state, tick.footholds, tick.feedback, bench.shifting);
+}
+void swing_on(GaitBench& bench, const GaitTick& tick) {
+  bench.gait.tick(tick.now_ns, tick.state, tick.footholds, tick.feedback, bench.swinging);
+}
+void stage_gait_walk_tick(GaitBench& bench, const GaitTick& tick) {
+  bench.gait.tick(tick.now_ns, tick.state, tick.footholds, tick.feedback, bench.walking);
 }
 
 void stage_gait_plan(StairPlan& p) {

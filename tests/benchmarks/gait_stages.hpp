@@ -21,11 +21,19 @@ struct GaitTick {
 
 struct GaitBench {
   Gait gait;
-  JointCommand swinging, shifting;  // of either stage: two functions that do the same become one
+  JointCommand swinging, shifting, walking;  // of each stage: functions that do the same become one
 };
 // Both feet onto a tread, as an ideal climb does it: the gait as it was when the tread below was climbed.
 struct GaitStair {
   GaitStair();
+  GaitBench start;
+  std::vector<GaitTick> ticks;
+};
+
+// On the way to a place behind a wall: the gait looks for a step that comes nearer, and for a way round. From its first
+// tick on.
+struct WalkAtAWall {
+  WalkAtAWall();
   GaitBench start;
   std::vector<GaitTick> ticks;
 };
@@ -49,6 +57,8 @@ struct StairPlan {
 
 void stage_gait_swing_tick(GaitBench& bench, const GaitTick& tick);
 void stage_gait_shift_tick(GaitBench& bench, const GaitTick& tick);  // and of touch-down and lift-off: searches, plans
+void stage_gait_walk_tick(GaitBench& bench, const GaitTick& tick);   // on both feet
+void swing_on(GaitBench& bench, const GaitTick& tick);               // between those, not counted
 void stage_gait_plan(StairPlan& plan);
 void stage_gait_proof(StairPlan& plan);
 
