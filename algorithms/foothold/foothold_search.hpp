@@ -104,9 +104,9 @@ class FootholdSearch {
     double beyond_m = 0.16;
     double level_gap_m = 0.35;
     double facing_cos = 0.64;
-    double heel_share = 0.65;
-    double tread_heel_inset_max_m = 0.026;
-    double floor_heel_inset_max_m = 0.028;
+    double heel_share = 0.78;
+    double tread_heel_inset_max_m = 0.030;
+    double floor_heel_inset_max_m = 0.032;
     double hidden_m = 0.010;
 
     static void visit(auto& p, auto& field) {

@@ -156,7 +156,7 @@ bool SurfaceBuilder::begin_line(Edge edge) noexcept {
   const EdgeLineFinder::Measured near_side{own.plane, own.covariance}, far_side{far.plane, far.covariance};
   work_.add(900);
   edge_lines_.begin(params_.edge_lines, noise_, raw_->intrinsics, image_->column_rays, image_->columns, near_side,
-                    &far_side, edge == Edge::kNosing);
+                    &far_side, edge == Edge::kNosing, edge == Edge::kBack && drops);
   lines_.back_drops = edge == Edge::kBack && drops;
   if (higher != kNoRegion) {
     lines_.occluder = edge_lines_.guessed_line();

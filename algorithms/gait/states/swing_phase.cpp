@@ -170,13 +170,14 @@ void SwingPhase::follow(const GaitInput& in, GaitShared& gait) noexcept {
   const Transform& stance = gait.plan.plan_T_sole(other(goal_.foot));
   const bool reaches_back = on_level(goal_.kind) || goal_.kind == StepKind::kLeading;
   const bool reaches_shortly = goal_.kind == StepKind::kPassing;  // the torso rises, and leaves its leg too short
-  const double until = in.leg_impaired   ? params.abort_mute_share * path_.duration_ticks()
-                       : reaches_back    ? params.abort_share * path_.duration_ticks()
-                       : reaches_shortly ? params.abort_passing_ticks
-                                         : 0.0;
+  const double until = heel_up_rad_ > 0.0 ? 0.0  // down after the other foot: on it goes, whatever happens
+                       : in.leg_impaired  ? params.abort_mute_share * path_.duration_ticks()
+                       : reaches_back     ? params.abort_share * path_.duration_ticks()
+                       : reaches_shortly  ? params.abort_passing_ticks
+                                          : 0.0;
   // Back to another tread the body topples, which is on its way from there: on it goes where that takes no longer.
   const double stop_until = in.stop_requested != StopReason::kOperator ? 0.0
-                            : heel_up_rad_ > 0.0                       ? 0.0  // down after the other one, on it goes
+                            : heel_up_rad_ > 0.0                       ? 0.0
                             : reaches_back                             ? params.abort_passing_ticks
                                                                        : path_.duration_ticks() - params.stop_ticks;
   const bool went_back = timing_.goes_back();

@@ -147,10 +147,11 @@ class EdgeLineFinder {
     Mat3 covariance = Mat3::Zero();  // of its m
   };
   // surface_above: the surface lies above its boundary in the image (a nosing), else below it (a back line). other:
-  // the plane on the far side; null when that is not known, then only leaving the surface's plane counts.
+  // the plane on the far side; null when that is not known, then only leaving the surface's plane counts. drops: it
+  // lies below a back line, which hides its beginning.
   void begin(const Params& params, const DepthNoiseModel& noise, const CameraIntrinsics& intrinsics,
              const ColumnRays& rays, const ColumnImage& image, const Measured& own, const Measured* other,
-             bool surface_above) noexcept;
+             bool surface_above, bool drops = false) noexcept;
   // Searches the next columns; true when all are done. At most max_columns columns, a multiple of kSlots.
   bool step(std::int32_t max_columns) noexcept;
   // kAgain: the tread overhangs the riser with a face of its own; step() once more, against that face.
@@ -311,7 +312,7 @@ class EdgeLineFinder {
   const ColumnImage* image_ = nullptr;
   InversePlane surface_;
   OtherPlane other_;
-  bool surface_above_ = true;
+  bool surface_above_ = true, drops_ = false;
   Axes axes_;
   std::array<Vec3, 2> guess_ends_m_{Vec3::Zero(), Vec3::Zero()};
 

@@ -66,7 +66,7 @@ bool EdgeLineFinder::try_gap_of_column(std::int32_t column, Gap& gap) const noex
 }
 
 bool EdgeLineFinder::begins_at_gap() noexcept {
-  if (gap_tried_ || !surface_above_) return false;
+  if (gap_tried_ || !(surface_above_ || drops_)) return false;
   gap_tried_ = true;
   work_.add(600);
   std::array<double, kMaxGroups> shifts{};
@@ -79,12 +79,13 @@ bool EdgeLineFinder::begins_at_gap() noexcept {
   for (std::int32_t g = guess_.first_column; g <= guess_.last_column; g += stride) {
     work_.add(450);
     Gap gap;
-    if (try_gap_of_column(g, gap)) shifts[count++] = gap.from + window_px - guess_.at(middle_px(g));
+    if (!try_gap_of_column(g, gap)) continue;
+    shifts[count++] = (surface_above_ ? gap.from + window_px : gap.to - window_px) - guess_.at(middle_px(g));
   }
   if (2 * static_cast<std::int32_t>(count) * stride < columns || count < 3) return false;
   const auto middle = shifts.begin() + static_cast<std::ptrdiff_t>(count / 2);
   std::nth_element(shifts.begin(), middle, shifts.begin() + static_cast<std::ptrdiff_t>(count));
-  guess_.row += *middle;  // the surface is above
+  guess_.row += *middle;
   params_.window_px = kMaxWindow_px;
   restart();
   return true;
@@ -110,7 +111,9 @@ bool EdgeLineFinder::settle_gap(Fit& fit, double apart_m, double limit_m) const 
     }
     return true;
   }
-  widen_by_gap(fit, surface_above_ && std::abs(at) < 1.0 ? at : -1.0);
+  // A lip hides where what is below begins: rows without depth before that are the surface's, a strip along its edge,
+  // or the lower one's own.
+  widen_by_gap(fit, drops_ ? 0.0 : surface_above_ && std::abs(at) < 1.0 ? at : -1.0);
   return false;
 }
 
