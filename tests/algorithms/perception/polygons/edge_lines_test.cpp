@@ -73,7 +73,13 @@ struct Bench {
       finder->add_guess(static_cast<std::int32_t>(c) / kColumn_px, static_cast<std::int32_t>(r + error_px));
     }
   }
-  EdgeLineFinder::Outcome find(const InversePlane* other, bool nosing, EdgeLine& line, double variance = 1e-6) {
+  // A block as high as a step, the robot on it, and the floor beyond.
+  void stand_above(double edge_m) {
+    scene.boxes = {{{-1.0, -0.6, 0.0}, {edge_m, 0.6, stairs.rise_m}}};
+    scene.place_camera(1.2 + stairs.rise_m, 1.04, 0.05, 0.02);
+  }
+  EdgeLineFinder::Outcome find(const InversePlane* other, bool nosing, EdgeLine& line, double variance = 1e-6,
+                               bool drops = false) {
     RawRange range;
     range.set({}, scene.intrinsics.depth_unit_m);
     for (std::int32_t r = 0; r < 480; ++r) {
@@ -84,7 +90,8 @@ struct Bench {
     const Mat3 covariance = variance * Mat3::Identity();
     const EdgeLineFinder::Measured surface{tread(), covariance};
     const EdgeLineFinder::Measured beyond{other != nullptr ? *other : InversePlane{}, covariance};
-    finder->begin({}, {}, scene.intrinsics, rays, *columns, surface, other != nullptr ? &beyond : nullptr, nosing);
+    finder->begin({}, {}, scene.intrinsics, rays, *columns, surface, other != nullptr ? &beyond : nullptr, nosing,
+                  drops);
     EdgeLineFinder::Outcome outcome = EdgeLineFinder::Outcome::kAgain;
     for (int pass = 0; pass < 3 && outcome == EdgeLineFinder::Outcome::kAgain; ++pass) {
       while (!finder->step(48)) {
@@ -138,6 +145,24 @@ TEST_P(NosingNoise, StripWithoutDepth_RiserBelowIt_NosingWithinThreeMillimetres)
         EXPECT_LT(bench.error_m(line, edge_m), 0.003) << strip_m << " " << seed << " " << guess_m;
         EXPECT_LT(line.sigma_m, 0.003) << strip_m << " " << seed << " " << guess_m;
       }
+    }
+  }
+}
+// Without a riser to tell where it is, a lip lies in the gap that its strip leaves: in the outer half.
+TEST_P(NosingNoise, LipWithAStripWithoutDepth_IsFoundInTheOuterHalfOfTheGap) {
+  constexpr double kEdge_m = 0.5;
+  for (const double strip_m : {0.0, 0.015, 0.03, 0.05}) {
+    for (std::uint32_t seed = 1; seed <= 3; ++seed) {
+      Bench bench(0.0);
+      bench.stand_above(kEdge_m);
+      bench.draw({.correlated = GetParam()}, seed);
+      bench.blank(kEdge_m - strip_m, strip_m, 0.0);
+      const InversePlane floor = bench.plane(Vec3::UnitZ(), Vec3::Zero());
+      EdgeLine line;
+      bench.guess(kEdge_m - strip_m, bench.stairs.rise_m, 0.0);
+      ASSERT_EQ(bench.find(&floor, false, line, 1e-6, true), EdgeLineFinder::Outcome::kFound) << strip_m << " " << seed;
+      EXPECT_LT(bench.error_m(line, kEdge_m), 0.004 + 0.3 * strip_m) << strip_m << " " << seed;
+      EXPECT_LT(bench.error_m(line, kEdge_m), 3.0 * line.sigma_m) << strip_m << " " << seed;
     }
   }
 }
