@@ -155,9 +155,11 @@ bool SurfaceBuilder::begin_line(Edge edge) noexcept {
   const Region &own = (*regions_)[id_], &far = (*regions_)[other];
   const EdgeLineFinder::Measured near_side{own.plane, own.covariance}, far_side{far.plane, far.covariance};
   work_.add(900);
-  edge_lines_.begin(params_.edge_lines, noise_, raw_->intrinsics, image_->column_rays, image_->columns, near_side,
-                    &far_side, edge == Edge::kNosing, edge == Edge::kBack && drops);
   lines_.back_drops = edge == Edge::kBack && drops;
+  using Kind = EdgeLineFinder::Kind;
+  const Kind kind = edge == Edge::kNosing ? Kind::kNosing : drops ? Kind::kLip : Kind::kBack;
+  edge_lines_.begin(params_.edge_lines, noise_, raw_->intrinsics, image_->column_rays, image_->columns, near_side,
+                    &far_side, kind);
   if (higher != kNoRegion) {
     lines_.occluder = edge_lines_.guessed_line();
     return false;

@@ -161,6 +161,22 @@ Transform SwingPhase::beside_path(const BodyPlan& plan, const Transform& odom_T_
   return plan_T_sole;
 }
 
+// A foot that follows down goes on whatever happens: its body is over the other one.
+SwingPhase::Turns SwingPhase::turns_until(const GaitInput& in, const SwingParams& params) const noexcept {
+  if (heel_up_rad_ > 0.0) return {};
+  const bool reaches_back = on_level(goal_.kind) || goal_.kind == StepKind::kLeading;
+  const bool reaches_shortly = goal_.kind == StepKind::kPassing;  // the torso rises, and leaves its leg too short
+  Turns turns;
+  turns.by_itself_tick = in.leg_impaired   ? params.abort_mute_share * path_.duration_ticks()
+                         : reaches_back    ? params.abort_share * path_.duration_ticks()
+                         : reaches_shortly ? params.abort_passing_ticks
+                                           : 0.0;
+  // Back to another tread the body topples, which is on its way from there: on it goes where that takes no longer.
+  if (in.stop_requested != StopReason::kOperator) return turns;
+  turns.asked_tick = reaches_back ? params.abort_passing_ticks : path_.duration_ticks() - params.stop_ticks;
+  return turns;
+}
+
 void SwingPhase::follow(const GaitInput& in, GaitShared& gait) noexcept {
   for (std::size_t j = 0; j < kJointsPerLeg && in.leg_impaired; ++j) {
     leg_was_mute_ = leg_was_mute_ || in.feedback.is_mute(joint_index(goal_.foot, j));
@@ -168,18 +184,7 @@ void SwingPhase::follow(const GaitInput& in, GaitShared& gait) noexcept {
   if (lowers_body_) return;  // the foot is as low on its path as it gets
   const SwingParams& params = gait.params.swing;
   const Transform& stance = gait.plan.plan_T_sole(other(goal_.foot));
-  const bool reaches_back = on_level(goal_.kind) || goal_.kind == StepKind::kLeading;
-  const bool reaches_shortly = goal_.kind == StepKind::kPassing;  // the torso rises, and leaves its leg too short
-  const double until = heel_up_rad_ > 0.0 ? 0.0  // down after the other foot: on it goes, whatever happens
-                       : in.leg_impaired  ? params.abort_mute_share * path_.duration_ticks()
-                       : reaches_back     ? params.abort_share * path_.duration_ticks()
-                       : reaches_shortly  ? params.abort_passing_ticks
-                                          : 0.0;
-  // Back to another tread the body topples, which is on its way from there: on it goes where that takes no longer.
-  const double stop_until = in.stop_requested != StopReason::kOperator ? 0.0
-                            : heel_up_rad_ > 0.0                       ? 0.0
-                            : reaches_back                             ? params.abort_passing_ticks
-                                                                       : path_.duration_ticks() - params.stop_ticks;
+  const Turns turns = turns_until(in, params);
   const bool went_back = timing_.goes_back();
   // A plan that has just been stopped, or has just gone on, is no body that falls.
   unjudged_ticks_ = in.mute ? params.unjudged_ticks : std::max(unjudged_ticks_ - 1, 0);
@@ -187,10 +192,10 @@ void SwingPhase::follow(const GaitInput& in, GaitShared& gait) noexcept {
   timing_.advance(params.timing,
                   {.falling_outward_m = side_sign(goal_.foot) * error_m.dot(stance.R.col(1).head<2>()),
                    .falling_ahead_m = error_m.dot(stance.R.col(0).head<2>()),
-                   .turn_until_tick = until,
+                   .turn_until_tick = turns.by_itself_tick,
                    .drive_share = gait.plan.drive_share(gait.robot.drives, goal_.foot),
                    .side_room_m = goal_.foothold.side_room_m[index_of(goal_.foot)] - params.side_margin_m,
-                   .wanted_back = timing_.tick() < (in.leg_impaired ? until : stop_until),
+                   .wanted_back = timing_.tick() < (in.leg_impaired ? turns.by_itself_tick : turns.asked_tick),
                    .may_hurry = !in.leg_impaired,
                    .stopped = early_touch_.stops()},
                   path_.duration_ticks());

@@ -36,6 +36,12 @@ class SwingPhase {
   void stop_foot(const GaitInput& in, GaitShared& gait) const noexcept;
   [[nodiscard]] SolePose start_flat(const GaitShared& gait) const noexcept;
   [[nodiscard]] Transform beside_path(const BodyPlan& plan, const Transform& odom_T_sole) const noexcept;
+  // Until which tick of its path it may go back: where the body falls, or a drive of its leg is silent; and where the
+  // operator asks to stop.
+  struct Turns {
+    double by_itself_tick = 0.0, asked_tick = 0.0;
+  };
+  [[nodiscard]] Turns turns_until(const GaitInput& in, const SwingParams& params) const noexcept;
   void land_soon(GaitShared& gait) noexcept;
   void land_beside(GaitShared& gait, const SolePose& target) noexcept;
   void lower_torso(GaitShared& gait, const SolePose& sole) const noexcept;

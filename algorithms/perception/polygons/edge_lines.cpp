@@ -60,7 +60,7 @@ bool EdgeLineFinder::try_guess(const Params& params, std::uint32_t seed) noexcep
 
 void EdgeLineFinder::begin(const Params& params, const DepthNoiseModel& noise, const CameraIntrinsics& intrinsics,
                            const ColumnRays& rays, const ColumnImage& image, const Measured& own, const Measured* other,
-                           bool surface_above, bool drops) noexcept {
+                           Kind kind) noexcept {
   params_ = params;
   params_.window_px = std::clamp(params.window_px, 4, kMaxWindow_px);
   noise_ = noise;
@@ -75,8 +75,8 @@ void EdgeLineFinder::begin(const Params& params, const DepthNoiseModel& noise, c
     other_.covariance = other->covariance;
     other_.both_covariance = own.covariance + other->covariance;
   }
-  surface_above_ = surface_above;
-  drops_ = drops;
+  surface_above_ = kind == Kind::kNosing;
+  drops_ = kind == Kind::kLip;
   face_.tried = false;
   gap_tried_ = false;
   restart();

@@ -146,12 +146,15 @@ class EdgeLineFinder {
     InversePlane plane;
     Mat3 covariance = Mat3::Zero();  // of its m
   };
-  // surface_above: the surface lies above its boundary in the image (a nosing), else below it (a back line). other:
-  // the plane on the far side; null when that is not known, then only leaving the surface's plane counts. drops: it
-  // lies below a back line, which hides its beginning.
+  enum class Kind : std::uint8_t {
+    kNosing,  // the surface lies above its boundary in the image
+    kBack,    // ... below it
+    kLip      // likewise, and what is beyond lies lower: its beginning is hidden
+  };
+  // other: the plane on the far side; null when that is not known, then only leaving the surface's plane counts.
   void begin(const Params& params, const DepthNoiseModel& noise, const CameraIntrinsics& intrinsics,
              const ColumnRays& rays, const ColumnImage& image, const Measured& own, const Measured* other,
-             bool surface_above, bool drops = false) noexcept;
+             Kind kind) noexcept;
   // Searches the next columns; true when all are done. At most max_columns columns, a multiple of kSlots.
   bool step(std::int32_t max_columns) noexcept;
   // kAgain: the tread overhangs the riser with a face of its own; step() once more, against that face.

@@ -14,6 +14,8 @@
 namespace polygmap {
 namespace {
 
+using Kind = EdgeLineFinder::Kind;
+
 struct Bench {
   test::DepthScene scene;
   test::StairSpec stairs;
@@ -78,8 +80,7 @@ struct Bench {
     scene.boxes = {{{-1.0, -0.6, 0.0}, {edge_m, 0.6, stairs.rise_m}}};
     scene.place_camera(1.2 + stairs.rise_m, 1.04, 0.05, 0.02);
   }
-  EdgeLineFinder::Outcome find(const InversePlane* other, bool nosing, EdgeLine& line, double variance = 1e-6,
-                               bool drops = false) {
+  EdgeLineFinder::Outcome find(const InversePlane* other, Kind kind, EdgeLine& line, double variance = 1e-6) {
     RawRange range;
     range.set({}, scene.intrinsics.depth_unit_m);
     for (std::int32_t r = 0; r < 480; ++r) {
@@ -90,8 +91,7 @@ struct Bench {
     const Mat3 covariance = variance * Mat3::Identity();
     const EdgeLineFinder::Measured surface{tread(), covariance};
     const EdgeLineFinder::Measured beyond{other != nullptr ? *other : InversePlane{}, covariance};
-    finder->begin({}, {}, scene.intrinsics, rays, *columns, surface, other != nullptr ? &beyond : nullptr, nosing,
-                  drops);
+    finder->begin({}, {}, scene.intrinsics, rays, *columns, surface, other != nullptr ? &beyond : nullptr, kind);
     EdgeLineFinder::Outcome outcome = EdgeLineFinder::Outcome::kAgain;
     for (int pass = 0; pass < 3 && outcome == EdgeLineFinder::Outcome::kAgain; ++pass) {
       while (!finder->step(48)) {
@@ -117,13 +117,13 @@ TEST_P(NosingNoise, EdgeLine_NosingAndBackLine_WithinThreePointOneMillimetres) {
       const InversePlane below = bench.riser(0), above = bench.riser(1);
       EdgeLine line;
       bench.guess(bench.stairs.first_riser_x_m - nosing_m, bench.stairs.rise_m, 2.0);
-      ASSERT_EQ(bench.find(&below, true, line), EdgeLineFinder::Outcome::kFound);
+      ASSERT_EQ(bench.find(&below, Kind::kNosing, line), EdgeLineFinder::Outcome::kFound);
       EXPECT_TRUE(line.valid);
       EXPECT_LT(bench.error_m(line, bench.stairs.first_riser_x_m - nosing_m), 0.0031) << nosing_m << " " << seed;
       EXPECT_LT((line.b_m - line.a_m).norm(), 1.3);
       EXPECT_LT(std::abs(bench.tread().distance_m(line.a_m)), 1e-9);
       bench.guess(bench.stairs.first_riser_x_m + bench.stairs.tread_m, bench.stairs.rise_m, -2.0);
-      ASSERT_EQ(bench.find(&above, false, line), EdgeLineFinder::Outcome::kFound);
+      ASSERT_EQ(bench.find(&above, Kind::kBack, line), EdgeLineFinder::Outcome::kFound);
       EXPECT_LT(bench.error_m(line, bench.stairs.first_riser_x_m + bench.stairs.tread_m), 0.003) << nosing_m;
     }
   }
@@ -141,7 +141,8 @@ TEST_P(NosingNoise, StripWithoutDepth_RiserBelowIt_NosingWithinThreeMillimetres)
         const InversePlane below = bench.riser(0);
         EdgeLine line;
         bench.guess(guess_m, bench.stairs.rise_m, 0.0);
-        ASSERT_EQ(bench.find(&below, true, line), EdgeLineFinder::Outcome::kFound) << strip_m << " " << guess_m;
+        ASSERT_EQ(bench.find(&below, Kind::kNosing, line), EdgeLineFinder::Outcome::kFound)
+            << strip_m << " " << guess_m;
         EXPECT_LT(bench.error_m(line, edge_m), 0.003) << strip_m << " " << seed << " " << guess_m;
         EXPECT_LT(line.sigma_m, 0.003) << strip_m << " " << seed << " " << guess_m;
       }
@@ -160,7 +161,7 @@ TEST_P(NosingNoise, LipWithAStripWithoutDepth_IsFoundInTheOuterHalfOfTheGap) {
       const InversePlane floor = bench.plane(Vec3::UnitZ(), Vec3::Zero());
       EdgeLine line;
       bench.guess(kEdge_m - strip_m, bench.stairs.rise_m, 0.0);
-      ASSERT_EQ(bench.find(&floor, false, line, 1e-6, true), EdgeLineFinder::Outcome::kFound) << strip_m << " " << seed;
+      ASSERT_EQ(bench.find(&floor, Kind::kLip, line), EdgeLineFinder::Outcome::kFound) << strip_m << " " << seed;
       EXPECT_LT(bench.error_m(line, kEdge_m), 0.004 + 0.3 * strip_m) << strip_m << " " << seed;
       EXPECT_LT(bench.error_m(line, kEdge_m), 3.0 * line.sigma_m) << strip_m << " " << seed;
     }
@@ -177,7 +178,7 @@ TEST_P(NosingNoise, StripOverTheFront_RiserBeginsLower_SigmaCoversTheError) {
       const InversePlane below = bench.riser(0);
       EdgeLine line;
       bench.guess(edge_m, bench.stairs.rise_m, 0.0);
-      ASSERT_EQ(bench.find(&below, true, line), EdgeLineFinder::Outcome::kFound) << lip_m;
+      ASSERT_EQ(bench.find(&below, Kind::kNosing, line), EdgeLineFinder::Outcome::kFound) << lip_m;
       EXPECT_LT(bench.error_m(line, edge_m), 2.0 * line.sigma_m) << lip_m << " " << seed;
       EXPECT_GT(line.sigma_m, 0.0025) << lip_m << " " << seed;
     }
@@ -195,7 +196,8 @@ TEST_P(NosingNoise, StripOnAnOverhang_FrontBelowIt_NosingWithinThreePointFiveMil
         const InversePlane below = bench.riser(0);
         EdgeLine line;
         bench.guess(edge_m, bench.stairs.rise_m, 0.0);
-        ASSERT_EQ(bench.find(&below, true, line), EdgeLineFinder::Outcome::kFound) << nosing_m << " " << strip_m;
+        ASSERT_EQ(bench.find(&below, Kind::kNosing, line), EdgeLineFinder::Outcome::kFound)
+            << nosing_m << " " << strip_m;
         EXPECT_LT(bench.error_m(line, edge_m), 0.0035) << nosing_m << " " << strip_m << " " << seed;
       }
     }
@@ -212,7 +214,7 @@ TEST(EdgeLineFinderTest, RiserFittedAside_PixelsBesideTheEdgeSayWhereItIs) {
       const InversePlane below = bench.plane(-Vec3::UnitX(), {bench.stairs.first_riser_x_m + aside_m, 0, 0});
       EdgeLine line;
       bench.guess(bench.stairs.first_riser_x_m, bench.stairs.rise_m, 2.0);
-      ASSERT_EQ(bench.find(&below, true, line, 1e-5), EdgeLineFinder::Outcome::kFound);
+      ASSERT_EQ(bench.find(&below, Kind::kNosing, line, 1e-5), EdgeLineFinder::Outcome::kFound);
       EXPECT_LT(bench.error_m(line, bench.stairs.first_riser_x_m), 0.0008) << seed << " " << aside_m;
     }
   }
@@ -226,7 +228,7 @@ TEST(EdgeLineFinderTest, NoPlaneBeyond_DepthJumpIsFound) {
   bench.draw({}, 4);
   bench.guess(0.3, 0.15, 0.0);
   EdgeLine line;
-  ASSERT_EQ(bench.find(nullptr, true, line), EdgeLineFinder::Outcome::kFound);
+  ASSERT_EQ(bench.find(nullptr, Kind::kNosing, line), EdgeLineFinder::Outcome::kFound);
   EXPECT_LT(bench.error_m(line, 0.3), 0.005);
 }
 
@@ -243,12 +245,12 @@ TEST(EdgeLineFinderTest, ColumnsHiddenByTheBody_AreLeftOut) {
   const InversePlane below = bench.riser(0);
   bench.guess(bench.stairs.first_riser_x_m, bench.stairs.rise_m, 0.0);
   EdgeLine line;
-  ASSERT_EQ(bench.find(&below, true, line), EdgeLineFinder::Outcome::kFound);
+  ASSERT_EQ(bench.find(&below, Kind::kNosing, line), EdgeLineFinder::Outcome::kFound);
   EXPECT_LT(bench.error_m(line, bench.stairs.first_riser_x_m), 0.003);
   EXPECT_LT(bench.finder->column_count(), 115);
   // All hidden: no line.
   bench.flags->fill(kPixelBody);
-  EXPECT_EQ(bench.find(&below, true, line), EdgeLineFinder::Outcome::kFewColumns);
+  EXPECT_EQ(bench.find(&below, Kind::kNosing, line), EdgeLineFinder::Outcome::kFewColumns);
   EXPECT_FALSE(line.valid);
 }
 
@@ -260,7 +262,7 @@ TEST(EdgeLineFinderTest, NoEdgeInThePicture_GivesNone) {
   const InversePlane below = bench.riser(0);
   bench.guess(bench.stairs.first_riser_x_m, bench.stairs.rise_m, 0.0);
   EdgeLine line;
-  EXPECT_NE(bench.find(&below, true, line), EdgeLineFinder::Outcome::kFound);
+  EXPECT_NE(bench.find(&below, Kind::kNosing, line), EdgeLineFinder::Outcome::kFound);
   EXPECT_FALSE(line.valid);
 }
 
