@@ -80,6 +80,7 @@ struct StepDownParams {
   double turn_rad = 0.35;
   double com_above_base_m = 0.09;
   double leave_m = 0.008;
+  // Both by the legs' kinematics for drops of 0.08 to 0.17 m on treads of 0.28 m, and tried in the simulation alone.
   double rest_margin_rad = 0.1;
   double rest_share = 0.2;
   HeelRiseParams heel_rise;
