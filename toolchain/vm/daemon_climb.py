@@ -123,15 +123,15 @@ def judge(out, args):
     frames = compare(out, args.bus)
     ticks, differ = replay(out / "run.mcap")
     figures = {
-        "steps": int(robot.get("steps", 0)), "ticks": int(last.get("cycles", 0)),
+        "steps": int(robot.get("steps", 0)), "state": last.get("state"), "phase": last.get("phase"), "reason": last.get("reason"),
+        "support": robot.get("support"), "fell": robot.get("fell"), "exit": last.get("exit"), "down_s": robot.get("down_s"),
+        "ticks": int(last.get("cycles", 0)),
         "overruns": sum(int(last.get(key, 1)) for key in ("overruns", "skipped", "caught_up")),
         "page_faults": int(last.get("page_faults", 1)), "heap_calls": int(last.get("heap_calls", 1)),
         "frames": frames.get("frames", 0), "frames_differ": frames.get("frames_differ", 1) + frames.get("missing", 0),
         "replayed": ticks, "ticks_differ": differ, "wake_max_us": last.get("wake_max_us"),
         "special": frames.get("special", 0), "pictures": frames.get("pictures", 0),
         "pictures_lost": frames.get("lost", 1) + sum(int(camera.get(key, 0)) for key in BAD),
-        "state": last.get("state"), "phase": last.get("phase"), "reason": last.get("reason"),
-        "support": robot.get("support"), "fell": robot.get("fell"), "exit": last.get("exit"), "down_s": robot.get("down_s"),
         "fault": "none" if not args.inject else "missed" if missed else "injected"}
     flaws = ("overruns", "page_faults", "heap_calls", "frames_differ", "ticks_differ", "pictures_lost")
     good = (not missed and not any(figures[key] for key in flaws) and figures["steps"] == args.steps and figures["fell"] == "0"
