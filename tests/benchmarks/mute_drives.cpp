@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// mute_drives BUS_FILE ds|ss mujoco|kinematic SEED [FIRST LAST]: a table of what becomes of a climb of two steps when a
-// drive, or a bus with its drives, falls silent for good, at moments of its phases (of the swings FIRST to LAST). The
-// climb is run once; at each moment a copy of the process goes on with each fault. A cell: "ok" on both feet, "foot" on
-// one, "FELL", or "runs" where it did not stop; and the seconds until safe_stop.
+// mute_drives BUS_FILE ds|ss mujoco|kinematic SEED [FIRST LAST [WORLD.toml]]: a table of what becomes of a climb of two
+// steps, or of the way to the goal of a world, when a drive, or a bus with its drives, falls silent for good, at
+// moments of its phases (of the swings FIRST to LAST). The climb is run once; at each moment a copy of the process goes
+// on with each fault. A cell: "ok" on both feet, "foot" on one, "FELL", or "runs" where it did not stop; and the
+// seconds until safe_stop.
 #include <cstdio>
 #include <cstdlib>
 #include <string_view>
@@ -55,8 +56,9 @@ int main(int argc, char** argv) {
   const auto is_one_of = [](std::string_view word, std::string_view a, std::string_view b) {
     return word == a || word == b;
   };
-  if ((argc != 5 && argc != 7) || !is_one_of(argv[2], "ds", "ss") || !is_one_of(argv[3], "mujoco", "kinematic")) {
-    return std::puts("mute_drives BUS_FILE ds|ss mujoco|kinematic SEED [FIRST LAST]"), 2;
+  if ((argc != 5 && argc != 7 && argc != 8) || !is_one_of(argv[2], "ds", "ss") ||
+      !is_one_of(argv[3], "mujoco", "kinematic")) {
+    return std::puts("mute_drives BUS_FILE ds|ss mujoco|kinematic SEED [FIRST LAST [WORLD.toml]]"), 2;
   }
   using namespace polygmap;
   sim::BusClimb::Options options;
@@ -64,7 +66,8 @@ int main(int argc, char** argv) {
   if (std::string_view(argv[2]) == "ss") options.pattern = GaitPattern::kSingleStep;
   if (std::string_view(argv[3]) == "kinematic") options.plant = sim::PlantKind::kKinematic;
   options.seed = std::strtoull(argv[4], nullptr, 10);
-  const std::size_t first = argc == 7 ? std::strtoul(argv[5], nullptr, 10) : 0;
-  const std::size_t last = argc == 7 ? std::strtoul(argv[6], nullptr, 10) : 1000;
+  const std::size_t first = argc > 5 ? std::strtoul(argv[5], nullptr, 10) : 0;
+  const std::size_t last = argc > 5 ? std::strtoul(argv[6], nullptr, 10) : 1000;
+  if (argc == 8) options.world = sim::read_world(argv[7]);
   return sim::run(options, first, last);
 }

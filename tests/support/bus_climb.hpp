@@ -12,12 +12,15 @@
 #include <memory>
 #include <new>
 #include <optional>
+#include <ostream>
 #include <string>
 #include <vector>
 
 #include "firmware/pipeline.hpp"
 #include "firmware/schedule.hpp"
 #include "sim_stub/bus/bus_robot.hpp"
+#include "sim_stub/host/operator/climb_operator.hpp"
+#include "sim_stub/host/world_file.hpp"
 
 namespace polygmap::sim {
 
@@ -35,19 +38,25 @@ class BusClimb {
     std::string bus_file;
     std::uint64_t seed = 1;
     int steps = 2;
+    std::optional<WorldFile> world;  // in the staircase's stead; it is sent to its goal
   };
   explicit BusClimb(const Options& options)
       : file_(config::read_bus(options.bus_file)), robot_(sim_options(options)), bus_(robot_, file_, nullptr) {
     Params params;
     params.gait.planner.pattern = options.pattern;
     config::limit_by_drives(file_, params.robot);
-    pipeline_ = std::make_unique<Pipeline>(Ports{robot_, robot_, bus_.joints(), robot_}, params);
+    if (const auto goal = options.world ? destination_in(*options.world) : std::nullopt)
+      dispatcher_.emplace(*goal, out_);
+    params.supervisor.autostart = params.supervisor.autostart && !dispatcher_;
+    const Ports ports{robot_, robot_, bus_.joints(), robot_, dispatcher_ ? &*dispatcher_ : nullptr};
+    pipeline_ = std::make_unique<Pipeline>(ports, params);
     executive_ = std::make_unique<OneLaneExecutive<>>(*pipeline_, robot_, pipeline_->lane_health(0));
     executive_->start(robot_.now_ns() + kCycle_ns);
   }
 
   void tick() {
     bus_.advance();
+    if (dispatcher_) dispatcher_->look(robot_.now_ns(), control().module_state());
     executive_->tick(robot_.now_ns());
   }
   void run_until(double time_s) {
@@ -80,6 +89,11 @@ class BusClimb {
     SimOptions sim;
     sim.seed = options.seed;
     sim.stairs.steps = options.steps;
+    if (options.world) {
+      const WorldPlace& start = options.world->start;
+      sim.world = options.world->world;
+      sim.start = {-start.x_m, start.y_m, start.yaw_rad.value_or(0.0), options.world->start_height_m};
+    }
     sim.plant_kind = options.plant;
     sim.camera.threaded = false;
     return sim;
@@ -88,6 +102,8 @@ class BusClimb {
   config::BusFile file_;
   SimRobot robot_;
   BusRobot bus_;
+  std::ostream out_{nullptr};
+  std::optional<Dispatcher> dispatcher_;
   std::unique_ptr<Pipeline> pipeline_;
   std::unique_ptr<OneLaneExecutive<>> executive_;
 };
