@@ -127,30 +127,51 @@ double margin_on_tops_m(const Transform& true_T_sole, const StairWorld& world, i
   return 0.5 * (least_m + most_m) - 0.5 * kSlit_m;
 }
 
+namespace {
+
+// From where to where a line from a point on is inside an outline; the first is beyond the second where it is nowhere.
+struct Crossing {
+  double enters_m = -std::numeric_limits<double>::infinity(), leaves_m = std::numeric_limits<double>::infinity();
+};
+Crossing crossing_of(const ConvexPolygon& outline, const Vec2& from_m, const Vec2& direction) {
+  Crossing crossing;
+  for (std::size_t k = 0; k < outline.size(); ++k) {
+    const HalfPlane inside = edge_half_plane(outline, k);
+    const double inward = inside.inward.dot(direction), depth_m = inside.distance_m(from_m);
+    if (std::abs(inward) < 1e-12) {
+      if (depth_m < 0.0) crossing.leaves_m = -std::numeric_limits<double>::infinity();
+    } else if (inward < 0.0) {
+      crossing.leaves_m = std::min(crossing.leaves_m, -depth_m / inward);
+    } else {
+      crossing.enters_m = std::max(crossing.enters_m, -depth_m / inward);
+    }
+  }
+  return crossing;
+}
+
+}  // namespace
+
 double edge_behind_m(const Vec3& point_m, double yaw_rad, const StairWorld& world, int step) {
   if (world.are_one(step, kFloorStep)) return std::numeric_limits<double>::quiet_NaN();
   const Vec2 back = -unit_at(yaw_rad), from_m = point_m.head<2>();
+  const auto crossing = [&](const Step& top) { return crossing_of(outline_of(top, 0.5 * kSlit_m), from_m, back); };
   double way_m = 0.0;
   for (std::size_t round = 0; round < world.steps.size(); ++round) {  // each top may lead on to the next one
     const double before_m = way_m;
     for (std::size_t i = 0; i < world.steps.size(); ++i) {
       if (!world.are_one(step, static_cast<int>(i))) continue;
-      const ConvexPolygon top = outline_of(world.steps[i], 0.5 * kSlit_m);
-      double enters_m = -std::numeric_limits<double>::infinity(), leaves_m = -enters_m;
-      for (std::size_t k = 0; k < top.size(); ++k) {
-        const HalfPlane inside = edge_half_plane(top, k);
-        const double inward = inside.inward.dot(back), depth_m = inside.distance_m(from_m);
-        if (std::abs(inward) < 1e-12) {
-          if (depth_m < 0.0) leaves_m = -std::numeric_limits<double>::infinity();
-        } else if (inward < 0.0) {
-          leaves_m = std::min(leaves_m, -depth_m / inward);
-        } else {
-          enters_m = std::max(enters_m, -depth_m / inward);
-        }
-      }
-      if (enters_m <= way_m + kSlit_m) way_m = std::max(way_m, leaves_m);
+      const Crossing of_top = crossing(world.steps[i]);
+      if (of_top.enters_m <= way_m + kSlit_m) way_m = std::max(way_m, of_top.leaves_m);
     }
     if (way_m == before_m) break;
+  }
+  // The last part may lie below the nosing of the next tread, where no foot fits and no camera looks.
+  constexpr double kHigher_m = 0.02;
+  for (std::size_t i = 0; i < world.steps.size(); ++i) {
+    if (world.are_one(step, static_cast<int>(i)) || world.steps[i].true_T_step.p_m.z() < point_m.z() + kHigher_m)
+      continue;
+    const Crossing above = crossing(world.steps[i]);
+    if (above.enters_m >= 0.0 && above.enters_m < above.leaves_m) way_m = std::min(way_m, above.enters_m + kSlit_m);
   }
   return way_m - 0.5 * kSlit_m;
 }

@@ -38,7 +38,7 @@ class BusClimb {
     std::string bus_file;
     std::uint64_t seed = 1;
     int steps = 2;
-    std::optional<WorldFile> world;  // in the staircase's stead; it is sent to its goal
+    std::optional<WorldFile> world = std::nullopt;  // in the staircase's stead; it is sent to its goal
   };
   explicit BusClimb(const Options& options)
       : file_(config::read_bus(options.bus_file)), robot_(sim_options(options)), bus_(robot_, file_, nullptr) {

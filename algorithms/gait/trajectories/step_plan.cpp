@@ -43,7 +43,7 @@ void plan_heel_rise(const StepParams& params, const SolePair& soles, StepPlan& p
   }
   if (is_leading) return;
   plan.heel_up_rad = heel_up_rad;
-  plan.heel_ticks = transfer.stay_ticks + transfer.on_ticks + params.lift_hold_ticks;
+  plan.heel_ticks = transfer.stay_ticks + transfer.on_ticks + params.lift_hold_ticks + plan.tried.heel_sooner_ticks;
   plan.shift_ticks = transfer.ticks() + params.lift_hold_ticks;
 }
 
@@ -95,7 +95,9 @@ StepPlan plan_step(const StepParams& params, const StepGoal& goal, const SolePai
   plan.rise_ticks = static_cast<std::int32_t>(std::min(tried.rise_longer * rise_share, 1.0) * plan.swing_ticks);
   plan.tried = tried;
   const bool needed = goal.kind == StepKind::kClosing || goal.kind == StepKind::kTrailing;
-  plan.joint_margin_rad = needed ? params.needed_margin_rad : params.joint_margin_rad;
+  plan.joint_margin_rad = needed                     ? params.needed_margin_rad
+                          : down && leads(goal.kind) ? params.down.lead_margin_rad
+                                                     : params.joint_margin_rad;
   plan.torque_share =
       is_high(params, goal, soles) ? std::min(params.high.torque_share, params.torque_share) : params.torque_share;
   plan.shape.toe_down_rad = on_floor ? 0.5 * tried.toe_down_rad : tried.toe_down_rad;
@@ -115,11 +117,11 @@ void plan_torso(const LegGeometry& geometry, const StepParams& params, const Sol
   TorsoParams torso = params.torso;
   double turn_rad = 0.0, lean_rad = 0.0;  // in a split stance down
   if (goes_down(plan.goal, soles)) {
-    torso.max_leg_m = params.down.max_leg_m;
+    torso.max_leg_m = params.down.max_leg_m - plan.tried.shorter_m;
     const double share = math::clamp(std::abs(landed[0].position_m.z() - soles[0].position_m.z() +
                                               landed[1].position_m.z() - soles[1].position_m.z()) /
                                          params.down.full_m,
-                                     0.0, 1.0);
+                                     0.0, params.down.most_share);
     lean_rad = share * params.down.lean_rad;
     turn_rad = share * params.down.turn_rad * (leads(plan.goal.kind) ? -1.0 : 1.0) * side_sign(plan.goal.foot);
   }

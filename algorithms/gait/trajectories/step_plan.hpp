@@ -74,8 +74,10 @@ struct StepDownParams {
                    .retreat_end = 0.20};
   double zmp_ahead_m = 0.01;
   double max_leg_m = 0.612;
+  double lead_margin_rad = 0.06;
   std::int32_t landing_hold_ticks = 100;
   double full_m = 0.13;
+  double most_share = 1.35;
   double lean_rad = 0.15;
   double turn_rad = 0.35;
   double com_above_base_m = 0.09;
@@ -90,11 +92,15 @@ struct StepDownParams {
     field("zmp_ahead_m", p.zmp_ahead_m, -0.05, 0.12,
           "Zero-moment point ahead of the ankle: where the ankles of both legs keep most of their ranges.");
     field("max_leg_m", p.max_leg_m, 0.4, 0.63, "Hip pitch to ankle, of 0.630 stretched.");
+    field("lead_margin_rad", p.lead_margin_rad, 0.0, 0.5,
+          "Margin of the leading step to the joints' limits: a foot that lands with its ankle at a stop feels the stop "
+          "for the ground.");
     field(
         "landing_hold_ticks", p.landing_hold_ticks, 0, 500,
         "The weight sets off so long after the leading foot's landing: a body far ahead of a flat rear foot bends its "
         "ankle.");
-    field("full_m", p.full_m, 0.01, 0.5, "The torso leans and turns in full from this drop on, and less below it.");
+    field("full_m", p.full_m, 0.01, 0.5, "The torso leans and turns as said for this drop, and less for a lower one.");
+    field("most_share", p.most_share, 1.0, 2.0, "And more for a higher one, up to this many times.");
     field("lean_rad", p.lean_rad, 0.0, 0.5,
           "The torso leans ahead by this when the leading foot lands, which keeps the hips back.");
     field("turn_rad", p.turn_rad, 0.0, 0.5, "It turns by this, the hip of the leading foot ahead.");
@@ -193,11 +199,14 @@ struct StepParams {
 };
 
 // What is tried to make a step possible, in this order: the ankles ask for toes that point down, the drives for time,
-// and a knee that is to lift the body with a deep bend for a slower rise.
+// and a knee that is to lift the body with a deep bend for a slower rise. Down, the leading ankle asks for legs that
+// bend more as it lands, and the one above for a heel that rises sooner.
 struct StepTry {
-  double toe_down_rad = 0.0;  // half of it on the floor
-  double longer = 1.0;        // the swing
-  double rise_longer = 1.0;   // factor on the torso's rise, which takes a share of the swing
+  double toe_down_rad = 0.0;           // half of it on the floor
+  double longer = 1.0;                 // the swing
+  double rise_longer = 1.0;            // factor on the torso's rise, which takes a share of the swing
+  double shorter_m = 0.0;              // down: by which the legs are shorter than `max_leg_m`
+  std::int32_t heel_sooner_ticks = 0;  // down: by which the rear heel begins to rise sooner
 };
 using StepTries = std::span<const StepTry>;
 inline constexpr std::array<StepTry, 8> kStepTries{
@@ -207,10 +216,30 @@ inline constexpr std::array<StepTry, 11> kHighStepTries{
 inline constexpr std::array<StepTry, 8> kPassingTries{
     {{0.4}, {0.5}, {0.3}, {0.6}, {0.2}, {0.4, 1.15}, {0.5, 1.15}, {0.5, 1.15, 1.1}}};
 // Down: the foot that leads stays level, the one that follows keeps its heel up until it is over the lip.
-inline constexpr std::array<StepTry, 8> kDownTries{
-    {{0.0}, {0.1}, {0.2}, {0.0, 1.25}, {0.1, 1.25}, {0.2, 1.25}, {0.1, 1.5}, {0.0, 1.5}}};
-inline constexpr std::array<StepTry, 8> kDownAfterTries{
-    {{0.4}, {0.3}, {0.5}, {0.2}, {0.4, 1.25}, {0.3, 1.25}, {0.5, 1.25}, {0.6, 1.25}}};
+inline constexpr std::array<StepTry, 12> kDownTries{{{0.0},
+                                                     {0.1},
+                                                     {0.2},
+                                                     {.shorter_m = 0.004},
+                                                     {.shorter_m = 0.008},
+                                                     {.longer = 1.25},
+                                                     {0.1, 1.25},
+                                                     {0.2, 1.25},
+                                                     {.longer = 1.25, .shorter_m = 0.004},
+                                                     {.longer = 1.25, .shorter_m = 0.008},
+                                                     {.longer = 1.25, .shorter_m = 0.014},
+                                                     {.longer = 1.5, .shorter_m = 0.014}}};
+inline constexpr std::array<StepTry, 11> kDownAfterTries{
+    {{0.4},
+     {0.3},
+     {0.5},
+     {0.2},
+     {.toe_down_rad = 0.4, .heel_sooner_ticks = 20},
+     {.toe_down_rad = 0.4, .longer = 1.25, .heel_sooner_ticks = 20},
+     {.toe_down_rad = 0.4, .longer = 1.25, .heel_sooner_ticks = 40},
+     {0.4, 1.25},
+     {0.3, 1.25},
+     {0.5, 1.25},
+     {0.6, 1.25}}};
 
 // From where its foot stands it comes down onto a tread.
 [[nodiscard]] bool goes_down(const StepGoal& goal, const SolePair& soles) noexcept;

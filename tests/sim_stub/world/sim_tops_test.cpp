@@ -74,5 +74,12 @@ TEST(EdgeBehind, TurnedHeading_IsAlongTheFoot) {
   EXPECT_NEAR(edge_behind_m(Vec3(0.3, 0, 0.2), 0.5, world, 0), 0.3 / std::cos(0.5), 1e-3);
 }
 
+// Down stairs the tread behind reaches over the one that is stood on.
+TEST(EdgeBehind, HigherTopOverThisOne_EndsItWhereThatBegins) {
+  const StairWorld world = world_of({{0.0, 1.0, 0.2}, {-0.5, 0.03, 0.33}, {-0.5, 0.3, 0.1}});
+  EXPECT_NEAR(edge_behind_m(Vec3(0.5, 0, 0.2), 0.0, world, 0), 0.47, 1e-6);
+  EXPECT_NEAR(edge_behind_m(Vec3(0.5, 0, 0.2), kPi, world, 0), 0.5, 1e-6);
+}
+
 }  // namespace
 }  // namespace polygmap::sim

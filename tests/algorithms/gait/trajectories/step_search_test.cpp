@@ -55,8 +55,8 @@ TEST(StepKnots_Eq30Eq37, WholeStep_KnotsAreEvenInTimeAndEndOnTheTarget) {
 // Down: both steps, from a platform and on from a tread.
 TEST(StepSearch, DropsOfTheStairs_LegsCanDoAllOfThem) {
   const StepParams params;
-  for (const double drop : {0.04, 0.08, 0.10, 0.12, 0.13}) {
-    for (const double ahead : {0.27, 0.285}) {
+  for (const double drop : {0.04, 0.08, 0.10, 0.12, 0.13, 0.15, 0.17}) {
+    for (const double ahead : {0.27, 0.285, 0.30}) {
       StepGoal lead, trail;
       lead.kind = StepKind::kLeading, lead.foot = Foot::kRight, lead.target = {{ahead, -0.1, -drop}, 0};
       trail.kind = StepKind::kTrailing, trail.foot = Foot::kLeft, trail.target = {{ahead, 0.1, -drop}, 0};
