@@ -22,7 +22,8 @@ inline constexpr double kMostMargin_m = 0.5;
 [[nodiscard]] double margin_on_tops_m(const Transform& true_T_sole, const StairWorld& world, int step,
                                       const SoleModel& sole);
 
-// From the point against the heading to where these tops end, or where a higher one begins above them; NaN on the floor.
+// From the point against the heading to where these tops end, or where a higher one begins above them; NaN on the
+// floor.
 [[nodiscard]] double edge_behind_m(const Vec3& point_m, double yaw_rad, const StairWorld& world, int step);
 
 }  // namespace polygmap::sim
