@@ -166,11 +166,12 @@ double edge_behind_m(const Vec3& point_m, double yaw_rad, const StairWorld& worl
     if (way_m == before_m) break;
   }
   // The last part may lie below the nosing of the next tread, where no foot fits and no camera looks.
-  constexpr double kHigher_m = 0.02;
+  constexpr double kHigher_m = 0.02, kNextTread_m = 0.35;
   for (std::size_t i = 0; i < world.steps.size(); ++i) {
-    if (world.are_one(step, static_cast<int>(i)) || world.steps[i].true_T_step.p_m.z() < point_m.z() + kHigher_m)
-      continue;
-    const Crossing above = crossing(world.steps[i]);
+    const Step& next = world.steps[i];
+    const double higher_m = next.true_T_step.p_m.z() - point_m.z();
+    if (!next.is_walkable || higher_m < kHigher_m || higher_m > kNextTread_m) continue;
+    const Crossing above = crossing(next);
     if (above.enters_m >= 0.0 && above.enters_m < above.leaves_m) way_m = std::min(way_m, above.enters_m + kSlit_m);
   }
   return way_m - 0.5 * kSlit_m;

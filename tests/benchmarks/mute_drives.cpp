@@ -24,8 +24,9 @@ void print_head() {
 int run(const BusClimb::Options& options, std::size_t first, std::size_t last) {
   std::vector<SwingTimes> swings;
   {
+    constexpr double kStairs_s = 60.0, kWorld_s = 300.0;
     BusClimb reference(options);
-    swings = swings_of(reference);
+    swings = swings_of(reference, options.world ? kWorld_s : kStairs_s);
   }
   print_head();
   BusClimb climb(options);
@@ -68,6 +69,13 @@ int main(int argc, char** argv) {
   options.seed = std::strtoull(argv[4], nullptr, 10);
   const std::size_t first = argc > 5 ? std::strtoul(argv[5], nullptr, 10) : 0;
   const std::size_t last = argc > 5 ? std::strtoul(argv[6], nullptr, 10) : 1000;
-  if (argc == 8) options.world = sim::read_world(argv[7]);
+  try {
+    if (argc == 8) options.world = sim::read_world(argv[7]);
+  } catch (const config::FileError& error) {
+    return std::fprintf(stderr, "mute_drives: error: %s\n", error.what()), 2;
+  }
+  if (options.world && !options.world->world.goal) {
+    return std::fprintf(stderr, "mute_drives: error: %s has no goal\n", argv[7]), 2;
+  }
   return sim::run(options, first, last);
 }

@@ -71,6 +71,17 @@ TEST(WorldClimb, GoalBelowAnEdge_IsReachedDownTheStep) {
   EXPECT_GT(s.sole_margin_min_m, 0.004);
 }
 
+TEST(WorldClimb, TwoHighStepsDown_GoalIsReached) {
+  const ClimbSummary s =
+      climb("[start]\nx = 0.8\ny = 0\nyaw_deg = 2\nsurface = \"high\"\n" + solid("high", 0.0, 1.2, 0.34) +
+                solid("low", 1.2, 1.5, 0.17) + "[goal]\nx = 2.2\ny = 0\nsurface = \"floor\"\n",
+            1);
+  EXPECT_TRUE(s.pass) << s.reason;
+  EXPECT_EQ(s.route.surfaces_stood_on, (std::vector<std::string>{"high", "low", "floor"}));
+  EXPECT_GT(s.sole_margin_min_m, 0.004);
+  EXPECT_LT(s.foothold_error_m.max, 0.010);
+}
+
 // From a block down to a place on the floor; stop_s: 0, nobody stops it.
 ClimbSummary climb_down(double stop_s) {
   std::vector<TimedRequest> asked{{1.0, OperatorCommand::kArm},

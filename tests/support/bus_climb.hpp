@@ -131,6 +131,7 @@ struct SwingTimes {
     in_the_air = false;
     swings.back().touch_down_s = climb.time_s();
   }
+  if (in_the_air) swings.pop_back();  // cut short by the limit
   return swings;
 }
 

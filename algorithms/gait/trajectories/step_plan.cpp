@@ -21,7 +21,8 @@ Vec2 zmp_in(const StepParams& params, const SolePose& sole, Foot foot, bool down
   return (sole.position_m + rotation_z(sole.yaw_rad) * local_m).head<2>();
 }
 
-// Down: the weight waits between the toe's edge of the upper foot and the other one while the upper heel rises.
+// Down: the weight waits between the toe's edge of the upper foot and the other one while the upper heel rises, which
+// may begin while the weight is on its way there.
 void plan_heel_rise(const StepParams& params, const SolePair& soles, StepPlan& plan) noexcept {
   constexpr double kQuintic = 1.875;  // greatest speed between two rests, of way over time
   const StepDownParams& down = params.down;
@@ -43,7 +44,8 @@ void plan_heel_rise(const StepParams& params, const SolePair& soles, StepPlan& p
   }
   if (is_leading) return;
   plan.heel_up_rad = heel_up_rad;
-  plan.heel_ticks = transfer.stay_ticks + transfer.on_ticks + params.lift_hold_ticks + plan.tried.heel_sooner_ticks;
+  plan.heel_ticks =
+      transfer.stay_ticks + transfer.on_ticks + params.lift_hold_ticks + plan.tried.rear_heel_sooner_ticks;
   plan.shift_ticks = transfer.ticks() + params.lift_hold_ticks;
 }
 
@@ -117,7 +119,7 @@ void plan_torso(const LegGeometry& geometry, const StepParams& params, const Sol
   TorsoParams torso = params.torso;
   double turn_rad = 0.0, lean_rad = 0.0;  // in a split stance down
   if (goes_down(plan.goal, soles)) {
-    torso.max_leg_m = params.down.max_leg_m - plan.tried.shorter_m;
+    torso.max_leg_m = params.down.max_leg_m - plan.tried.leg_shorter_m;
     const double share = math::clamp(std::abs(landed[0].position_m.z() - soles[0].position_m.z() +
                                               landed[1].position_m.z() - soles[1].position_m.z()) /
                                          params.down.full_m,

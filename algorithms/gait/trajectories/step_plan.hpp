@@ -93,14 +93,17 @@ struct StepDownParams {
           "Zero-moment point ahead of the ankle: where the ankles of both legs keep most of their ranges.");
     field("max_leg_m", p.max_leg_m, 0.4, 0.63, "Hip pitch to ankle, of 0.630 stretched.");
     field("lead_margin_rad", p.lead_margin_rad, 0.0, 0.5,
-          "Margin of the leading step to the joints' limits: a foot that lands with its ankle at a stop feels the stop "
+          "The leading step keeps this from the joints' limits: a foot that lands with its ankle at a stop feels the "
+          "stop "
           "for the ground.");
     field(
         "landing_hold_ticks", p.landing_hold_ticks, 0, 500,
         "The weight sets off so long after the leading foot's landing: a body far ahead of a flat rear foot bends its "
         "ankle.");
-    field("full_m", p.full_m, 0.01, 0.5, "The torso leans and turns as said for this drop, and less for a lower one.");
-    field("most_share", p.most_share, 1.0, 2.0, "And more for a higher one, up to this many times.");
+    field("full_m", p.full_m, 0.01, 0.5,
+          "The torso leans by `lean_rad` and turns by `turn_rad` for this drop, and less for a lower one.");
+    field("most_share", p.most_share, 1.0, 2.0,
+          "For a higher drop it leans and turns more, up to this many times as much.");
     field("lean_rad", p.lean_rad, 0.0, 0.5,
           "The torso leans ahead by this when the leading foot lands, which keeps the hips back.");
     field("turn_rad", p.turn_rad, 0.0, 0.5, "It turns by this, the hip of the leading foot ahead.");
@@ -202,11 +205,11 @@ struct StepParams {
 // and a knee that is to lift the body with a deep bend for a slower rise. Down, the leading ankle asks for legs that
 // bend more as it lands, and the one above for a heel that rises sooner.
 struct StepTry {
-  double toe_down_rad = 0.0;           // half of it on the floor
-  double longer = 1.0;                 // the swing
-  double rise_longer = 1.0;            // factor on the torso's rise, which takes a share of the swing
-  double shorter_m = 0.0;              // down: by which the legs are shorter than `max_leg_m`
-  std::int32_t heel_sooner_ticks = 0;  // down: by which the rear heel begins to rise sooner
+  double toe_down_rad = 0.0;                // half of it on the floor
+  double longer = 1.0;                      // the swing
+  double rise_longer = 1.0;                 // factor on the torso's rise, which takes a share of the swing
+  double leg_shorter_m = 0.0;               // down: by which the legs are shorter than `max_leg_m`
+  std::int32_t rear_heel_sooner_ticks = 0;  // down: by which the rear heel begins to rise sooner
 };
 using StepTries = std::span<const StepTry>;
 inline constexpr std::array<StepTry, 8> kStepTries{
@@ -216,26 +219,27 @@ inline constexpr std::array<StepTry, 11> kHighStepTries{
 inline constexpr std::array<StepTry, 8> kPassingTries{
     {{0.4}, {0.5}, {0.3}, {0.6}, {0.2}, {0.4, 1.15}, {0.5, 1.15}, {0.5, 1.15, 1.1}}};
 // Down: the foot that leads stays level, the one that follows keeps its heel up until it is over the lip.
-inline constexpr std::array<StepTry, 12> kDownTries{{{0.0},
+inline constexpr std::array<StepTry, 13> kDownTries{{{0.0},
                                                      {0.1},
                                                      {0.2},
-                                                     {.shorter_m = 0.004},
-                                                     {.shorter_m = 0.008},
+                                                     {.leg_shorter_m = 0.004},
+                                                     {.leg_shorter_m = 0.008},
                                                      {.longer = 1.25},
                                                      {0.1, 1.25},
                                                      {0.2, 1.25},
-                                                     {.longer = 1.25, .shorter_m = 0.004},
-                                                     {.longer = 1.25, .shorter_m = 0.008},
-                                                     {.longer = 1.25, .shorter_m = 0.014},
-                                                     {.longer = 1.5, .shorter_m = 0.014}}};
+                                                     {.longer = 1.25, .leg_shorter_m = 0.004},
+                                                     {.longer = 1.25, .leg_shorter_m = 0.008},
+                                                     {.longer = 1.25, .leg_shorter_m = 0.014},
+                                                     {.longer = 1.5},
+                                                     {.longer = 1.5, .leg_shorter_m = 0.014}}};
 inline constexpr std::array<StepTry, 11> kDownAfterTries{
     {{0.4},
      {0.3},
      {0.5},
      {0.2},
-     {.toe_down_rad = 0.4, .heel_sooner_ticks = 20},
-     {.toe_down_rad = 0.4, .longer = 1.25, .heel_sooner_ticks = 20},
-     {.toe_down_rad = 0.4, .longer = 1.25, .heel_sooner_ticks = 40},
+     {.toe_down_rad = 0.4, .rear_heel_sooner_ticks = 20},
+     {.toe_down_rad = 0.4, .longer = 1.25, .rear_heel_sooner_ticks = 20},
+     {.toe_down_rad = 0.4, .longer = 1.25, .rear_heel_sooner_ticks = 40},
      {0.4, 1.25},
      {0.3, 1.25},
      {0.5, 1.25},

@@ -43,7 +43,8 @@ void StepSearch::try_candidate(const RobotModel& robot, const StepParams& params
   proof_.begin(robot, StepKnots(robot, params, knot_ticks, candidate_, from, soles));
 }
 
-// How far the toes point down is nothing to a knee that lacks torque: the next try is the next slower one.
+// How far the toes point down, how long the legs are and when a heel rises is nothing to a knee that lacks torque: the
+// next try is the next slower one.
 void StepSearch::next_try() noexcept {
   const StepTry failed = tries_[try_++];
   if (proof_.check().torque_share <= proof_.knots().torque_share()) return;

@@ -81,5 +81,11 @@ TEST(EdgeBehind, HigherTopOverThisOne_EndsItWhereThatBegins) {
   EXPECT_NEAR(edge_behind_m(Vec3(0.5, 0, 0.2), kPi, world, 0), 0.5, 1e-6);
 }
 
+TEST(EdgeBehind, FloorAboveAndWhatIsNoTread_EndNothing) {
+  StairWorld world = world_of({{0.0, 1.0, 0.2}, {0.1, 0.3, 2.2}, {0.1, 0.3, 0.3}});
+  world.steps[2].is_walkable = false;
+  EXPECT_NEAR(edge_behind_m(Vec3(0.5, 0, 0.2), 0.0, world, 0), 0.5, 1e-6);
+}
+
 }  // namespace
 }  // namespace polygmap::sim

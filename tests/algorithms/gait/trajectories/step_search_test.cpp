@@ -52,23 +52,36 @@ TEST(StepKnots_Eq30Eq37, WholeStep_KnotsAreEvenInTimeAndEndOnTheTarget) {
   EXPECT_LT((knots[0].odom_T_sole[0].p_m - soles[0].p_m).norm(), 1e-12);
 }
 
-// Down: both steps, from a platform and on from a tread.
+// Down from a platform, both steps.
+StepSearch::State search_down(const StepParams& params, double drop_m, double ahead_m) {
+  StepGoal lead, trail;
+  lead.kind = StepKind::kLeading, lead.foot = Foot::kRight, lead.target = {{ahead_m, -0.1, -drop_m}, 0};
+  trail.kind = StepKind::kTrailing, trail.foot = Foot::kLeft, trail.target = {{ahead_m, 0.1, -drop_m}, 0};
+  const std::array<Transform, kFootCount> soles{SolePose{{0, 0.1, 0}, 0}.transform(),
+                                                SolePose{{0, -0.1, 0}, 0}.transform()};
+  StepSearch search;
+  search.begin(nominal_robot(), params, lead, trail, params.durations.stair_shift_ticks,
+               TorsoTrajectory::at_rest({Mat3::Identity(), {0.0, 0.0, 0.79}}), soles);
+  while (search.step(nominal_robot(), params) == StepSearch::State::kSearching) continue;
+  return search.state();
+}
+
 TEST(StepSearch, DropsOfTheStairs_LegsCanDoAllOfThem) {
-  const StepParams params;
-  for (const double drop : {0.04, 0.08, 0.10, 0.12, 0.13, 0.15, 0.17}) {
-    for (const double ahead : {0.27, 0.285, 0.30}) {
-      StepGoal lead, trail;
-      lead.kind = StepKind::kLeading, lead.foot = Foot::kRight, lead.target = {{ahead, -0.1, -drop}, 0};
-      trail.kind = StepKind::kTrailing, trail.foot = Foot::kLeft, trail.target = {{ahead, 0.1, -drop}, 0};
-      const std::array<Transform, kFootCount> soles{SolePose{{0, 0.1, 0}, 0}.transform(),
-                                                    SolePose{{0, -0.1, 0}, 0}.transform()};
-      StepSearch search;
-      search.begin(nominal_robot(), params, lead, trail, params.durations.stair_shift_ticks,
-                   TorsoTrajectory::at_rest({Mat3::Identity(), {0.0, 0.0, 0.79}}), soles);
-      while (search.step(nominal_robot(), params) == StepSearch::State::kSearching) continue;
-      EXPECT_EQ(search.state(), StepSearch::State::kFound) << drop << " " << ahead;
+  for (const double drop_m : {0.04, 0.08, 0.10, 0.12, 0.13, 0.15, 0.17}) {
+    for (const double ahead_m : {0.27, 0.285, 0.30}) {
+      EXPECT_EQ(search_down({}, drop_m, ahead_m), StepSearch::State::kFound) << drop_m << " " << ahead_m;
     }
   }
+}
+
+TEST(StepSearch, DropOfAFifthOfAMetre_IsRefused) {
+  EXPECT_EQ(search_down({}, 0.20, 0.285), StepSearch::State::kImpossible);
+}
+
+TEST(StepSearch, HighDropWithATorsoThatLeansNoMore_IsRefused) {
+  StepParams params;
+  params.down.most_share = 1.0;
+  EXPECT_EQ(search_down(params, 0.17, 0.285), StepSearch::State::kImpossible);
 }
 
 TEST(StepPlan, DownAfterTheOtherFoot_HeelRisesAboutTheToesEdge) {
