@@ -21,6 +21,12 @@ Vec2 zmp_in(const StepParams& params, const SolePose& sole, Foot foot, bool down
   return (sole.position_m + rotation_z(sole.yaw_rad) * local_m).head<2>();
 }
 
+// That a plan is to keep to the joints' limits.
+double joint_margin_rad(const StepParams& params, StepKind kind, bool down) noexcept {
+  if (kind == StepKind::kClosing || kind == StepKind::kTrailing) return params.needed_margin_rad;
+  return down && leads(kind) ? params.down.lead_margin_rad : params.joint_margin_rad;
+}
+
 // Down: the weight waits between the toe's edge of the upper foot and the other one while the upper heel rises, which
 // may begin while the weight is on its way there.
 void plan_heel_rise(const StepParams& params, const SolePair& soles, StepPlan& plan) noexcept {
@@ -96,10 +102,7 @@ StepPlan plan_step(const StepParams& params, const StepGoal& goal, const SolePai
                                              : params.durations.rise_share;
   plan.rise_ticks = static_cast<std::int32_t>(std::min(tried.rise_longer * rise_share, 1.0) * plan.swing_ticks);
   plan.tried = tried;
-  const bool needed = goal.kind == StepKind::kClosing || goal.kind == StepKind::kTrailing;
-  plan.joint_margin_rad = needed                     ? params.needed_margin_rad
-                          : down && leads(goal.kind) ? params.down.lead_margin_rad
-                                                     : params.joint_margin_rad;
+  plan.joint_margin_rad = joint_margin_rad(params, goal.kind, down);
   plan.torque_share =
       is_high(params, goal, soles) ? std::min(params.high.torque_share, params.torque_share) : params.torque_share;
   plan.shape.toe_down_rad = on_floor ? 0.5 * tried.toe_down_rad : tried.toe_down_rad;
