@@ -21,7 +21,7 @@ Vec2 zmp_in(const StepParams& params, const SolePose& sole, Foot foot, bool down
   return (sole.position_m + rotation_z(sole.yaw_rad) * local_m).head<2>();
 }
 
-// That a plan is to keep to the joints' limits.
+// A plan keeps this margin to the joints' limits.
 double joint_margin_rad(const StepParams& params, StepKind kind, bool down) noexcept {
   if (kind == StepKind::kClosing || kind == StepKind::kTrailing) return params.needed_margin_rad;
   return down && leads(kind) ? params.down.lead_margin_rad : params.joint_margin_rad;
