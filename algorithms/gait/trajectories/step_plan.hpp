@@ -74,8 +74,8 @@ struct StepDownParams {
                    .retreat_end = 0.20};
   double zmp_ahead_m = 0.01;
   double max_leg_m = 0.612;
-  double lead_margin_rad =
-      0.06;  // this and `most_share`: chosen in climbs down 0.15 and 0.17 m in the simulation alone
+  // This and most_share were chosen in climbs down 0.15 and 0.17 m, in the simulation alone.
+  double lead_margin_rad = 0.06;
   std::int32_t landing_hold_ticks = 100;
   double full_m = 0.13;
   double most_share = 1.35;
