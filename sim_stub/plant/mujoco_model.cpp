@@ -41,25 +41,31 @@ constexpr std::array<std::array<double, 3>, kJointsPerLeg> kLinkHalf_m{{{0.04, 0
                                                                         {0.02, 0.02, 0.02},
                                                                         {0.12, 0.04, 0.015}}};
 
-// A box; where the toe is round, boxes and upright cylinders in its corners, and where its ends are worn, both a little
-// higher there.
+// Of boxes alone: between two boxes contacts are exact, while those of a cylinder on a tread's edge may push it off
+// with hundreds of newtons (MuJoCo 2.2 goes from middle to middle, and the tread's is half a metre away). Where the toe
+// is round, each of its corners is a disc that boxes are inscribed in; where the sole's ends are worn, both are a
+// little higher there.
 void add_sole(Xml& xml, const char* side, const RobotErrors& errors, double ankle_to_sole_m) {
   const SoleRectangle& sole = errors.sole.collision;
   constexpr double kWorn_m = 0.004;
   constexpr double kLeast_m = 1e-3;  // of a box's half width
+  constexpr int kInscribed = 4;      // boxes in a disc: 2 % of its radius are left out at most
   const double round_m = std::min(errors.toe_round_m, sole.half_width_m - kLeast_m), worn_m = errors.sole_edge_m;
-  const auto box = [&](double from_x_m, double to_x_m, double half_width_m, double above_m) {
-    xml.add("<geom class='%s' type='box' pos='%.9g 0 %.9g' size='%.9g %.9g %.9g'/>", side, 0.5 * (from_x_m + to_x_m),
-            0.5 * (kSoleThickness_m + above_m) - ankle_to_sole_m, 0.5 * (to_x_m - from_x_m), half_width_m,
+  const auto box = [&](double from_x_m, double to_x_m, double half_width_m, double above_m, double y_m = 0.0) {
+    xml.add("<geom class='%s' type='box' pos='%.9g %.9g %.9g' size='%.9g %.9g %.9g'/>", side, 0.5 * (from_x_m + to_x_m),
+            y_m, 0.5 * (kSoleThickness_m + above_m) - ankle_to_sole_m, 0.5 * (to_x_m - from_x_m), half_width_m,
             0.5 * (kSoleThickness_m - above_m));
   };
   const auto outline = [&](double from_x_m, double to_x_m, double above_m) {
     box(from_x_m, to_x_m - round_m, sole.half_width_m, above_m);
     if (round_m == 0.0) return;
     box(to_x_m - round_m, to_x_m, sole.half_width_m - round_m, above_m);
-    for (const double y_m : {sole.half_width_m - round_m, round_m - sole.half_width_m}) {
-      xml.add("<geom class='%s' type='cylinder' pos='%.9g %.9g %.9g' size='%.9g %.9g'/>", side, to_x_m - round_m, y_m,
-              0.5 * (kSoleThickness_m + above_m) - ankle_to_sole_m, round_m, 0.5 * (kSoleThickness_m - above_m));
+    const double x_m = to_x_m - round_m, y_m = sole.half_width_m - round_m;
+    for (int i = 0; i < kInscribed; ++i) {
+      const double rad = (i + 0.5) * kPi / (2.0 * kInscribed);
+      for (const double left : {1.0, -1.0})
+        box(x_m, x_m + round_m * std::cos(rad), 0.5 * round_m * std::sin(rad), above_m,
+            left * (y_m + 0.5 * round_m * std::sin(rad)));
     }
   };
   outline(sole.heel_x_m + worn_m, sole.toe_x_m - worn_m, 0.0);

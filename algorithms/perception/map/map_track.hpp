@@ -67,6 +67,7 @@ struct TrackedSide {
   double reach_m = 0.0;  // of the last sighting: one frame alone does not make an unknown end grow
   double information = 0.0;
   std::int64_t seen_ns = 0;
+  double outlier_m = 0.0;  // where the last outlier had it
   std::uint32_t outliers = 0;
   bool observed = false;
 };
@@ -91,7 +92,8 @@ struct MapTrack {
   SurfaceKind kind = SurfaceKind::kOther;
   std::uint32_t sightings = 0;
   std::uint32_t misses = 0;
-  std::uint32_t outliers = 0;  // consecutive sightings of its plane elsewhere
+  std::uint32_t outliers = 0;      // consecutive sightings of its plane elsewhere
+  std::uint32_t other_fronts = 0;  // consecutive sightings of lines that face another way
   std::int64_t last_seen_ns = 0;
   Viewpoint seen_from;
   Transform map_T_local;  // z out of the surface; level: x up the stairs, y left; upright: y up

@@ -314,7 +314,7 @@ class PolygonMap {
   void turn_to(MapTrack& track, const Vec3& map_x) noexcept;
   void update_line(TrackedLine& line, const SeenLine& seen) noexcept;
   void update_back(MapTrack& track) noexcept;
-  void see_other_front(MapTrack& track) noexcept;
+  [[nodiscard]] bool faces_as(MapTrack& track) noexcept;
   void update_sides(MapTrack& track, bool first) noexcept;
   void update_side(TrackedSide& side, double seen_m, bool observed) noexcept;
   void rebuild(MapTrack& track) noexcept;

@@ -119,8 +119,13 @@ void PolygonMap::update_sides(MapTrack& track, bool first) noexcept {
     TrackedSide& side = track.sides[k];
     if (first) {
       const double reach_m = support - params_.sides.unknown_margin_m;
-      side = {
-          observed ? support : reach_m, reach_m, 1.0 / math::square(params_.sides.sigma_m), newest_ns_, 0, observed};
+      side = {observed ? support : reach_m,
+              reach_m,
+              1.0 / math::square(params_.sides.sigma_m),
+              newest_ns_,
+              0.0,
+              0,
+              observed};
     } else {
       update_side(side, support, observed);
     }
@@ -132,6 +137,8 @@ void PolygonMap::update_side(TrackedSide& side, double seen_m, bool observed) no
   // Certainly surface up to here, in this frame and in the one before.
   const double seen_reach_m = seen_m - params_.sides.unknown_margin_m;
   const double reach_m = std::min(seen_reach_m, std::exchange(side.reach_m, seen_reach_m));
+  // What was taken for the end was not where the surface is seen to go on: a leg split it there.
+  if (!observed && seen_reach_m > side.outlier_m) side.outliers = 0;
   if (!observed && !side.observed) {
     side.support_m = std::max(side.support_m, reach_m);
     return;
@@ -146,13 +153,14 @@ void PolygonMap::update_side(TrackedSide& side, double seen_m, bool observed) no
     return;
   }
   // The first observed end that does not cut off what was seen counts at once; contradictions must persist.
-  const bool extends = observed && !side.observed && seen_m > side.support_m - params_.sides.gate_m;
+  const bool extends = observed && !side.observed && seen_m > side.support_m;
   if (!extends) {
     ++counters_.side_outliers;
+    if (std::abs(seen_m - std::exchange(side.outlier_m, seen_m)) > params_.sides.gate_m) side.outliers = 0;
     if (++side.outliers < params_.outliers_to_reset) return;
     ++counters_.resets;
   }
-  side = {observed ? seen_m : reach_m, seen_reach_m, weight, newest_ns_, 0, observed};
+  side = {observed ? seen_m : reach_m, seen_reach_m, weight, newest_ns_, 0.0, 0, observed};
 }
 
 void PolygonMap::rebuild(MapTrack& track) noexcept {

@@ -139,16 +139,10 @@ void PolygonMap::fuse(MapTrack& track, double offset_m, double fade) noexcept {
   frame.R = frame_from(normal, frame.R.col(0));
 
   if (track.kind == SurfaceKind::kTread) {
-    if (track.nosing.sightings == 0 && track.back.sightings == 0) {
-      if (const std::optional<Vec3> heading = heading_from_lines()) turn_to(track, *heading);
+    if (faces_as(track)) {
+      if (const auto nosing = local_line(track, seen_.nosing)) update_line(track.nosing, *nosing);
+      update_back(track);
     }
-    const auto nosing = local_line(track, seen_.nosing);
-    if (nosing) {
-      update_line(track.nosing, *nosing);
-    } else {
-      see_other_front(track);
-    }
-    update_back(track);
     const TrackedLine& reference = track.nosing.sightings >= params_.lines.min_sightings ? track.nosing : track.back;
     if (reference.sightings >= params_.lines.min_sightings && std::abs(reference.state[1]) > params_.turn_slope) {
       turn_to(track, frame.R * Vec3{1.0, -reference.state[1], 0.0});
@@ -159,17 +153,26 @@ void PolygonMap::fuse(MapTrack& track, double offset_m, double fade) noexcept {
   rebuild(track);
 }
 
-// From another side, as on a landing or on the way back, another edge is the front one: seen again and again, and no
-// worse.
-void PolygonMap::see_other_front(MapTrack& track) noexcept {
+// Whether the frame's lines are those of the track's axes. From another side, as on a landing or on the way back,
+// another edge is the front one: seen again and again, and no worse, the axes turn to it; and at once where no line is
+// sure yet.
+bool PolygonMap::faces_as(MapTrack& track) noexcept {
   constexpr double kAside_cos = 0.70;
-  const std::optional<Vec3> heading = seen_.nosing.valid ? heading_from_lines() : std::nullopt;
-  if (!heading || heading->dot(track.map_T_local.R.col(0)) >= kAside_cos) return;
-  if (++track.nosing.outliers < params_.outliers_to_reset) return;
+  const std::optional<Vec3> heading = heading_from_lines();
+  if (!heading) return true;
+  const bool has_lines = track.nosing.sightings > 0 || track.back.sightings > 0;
+  if (has_lines && heading->dot(track.map_T_local.R.col(0)) >= kAside_cos) {
+    track.other_fronts = 0;
+    return true;
+  }
+  const std::uint32_t sure = params_.lines.min_sightings;
+  const bool is_sure = track.nosing.sightings >= sure || track.back.sightings >= sure;
+  if (is_sure && ++track.other_fronts < params_.outliers_to_reset) return false;
+  track.other_fronts = 0;
   track.nosing = track.back = {};
   track.back_drops = 0;
   turn_to(track, *heading);
-  if (const auto line = local_line(track, seen_.nosing)) update_line(track.nosing, *line);
+  return true;
 }
 
 void PolygonMap::merge(MapTrack& into, MapTrack& from) noexcept {

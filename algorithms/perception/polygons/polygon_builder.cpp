@@ -114,6 +114,12 @@ Outline2 PolygonBuilder::seen_of(const Outline2& flat) noexcept {
   return seen;
 }
 
+// By its column and its row in the whole picture.
+bool PolygonBuilder::is_own(std::int32_t column, std::int32_t row) const noexcept {
+  const RegionId label = regions_->labels.at(column, row);
+  return label != kNoRegion && (*regions_)[label].coplanar == own().coplanar;
+}
+
 // What is just outside an edge decides whether the surface ends there or only the view of it.
 EdgeKind PolygonBuilder::judge_edge(const Vec2& a, const Vec2& b, const Vec2& inside) noexcept {
   const FrameImage& picture = *picture_;
@@ -145,9 +151,12 @@ EdgeKind PolygonBuilder::judge_edge(const Vec2& a, const Vec2& b, const Vec2& in
       const auto w = static_cast<double>(picture.inverse_depth_at(c, r));
       if (!(w > 0.0)) continue;
       const double expected = plane.inverse_depth(picture.rays.ray(c, r));
+      const double apart_m = (w - expected) / std::max(expected * w, 1e-6);
       // Something well in front hides it, unless it stands on the surface right here (a riser's foot).
-      const bool hidden = expected > 1e-3 && w - expected > params_.apart_m * expected * w;
-      observed += hidden ? 0 : 1;
+      const bool hidden = expected > 1e-3 && apart_m > params_.apart_m;
+      // The polygon ends where a leg splits the surface, and the surface goes on.
+      const bool goes_on = std::abs(apart_m) < params_.goes_on_m && is_own(c / (kColumn_px / 2), 2 * r);
+      observed += hidden || goes_on ? 0 : 1;
       break;
     }
   }

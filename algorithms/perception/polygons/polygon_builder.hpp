@@ -44,6 +44,7 @@ class PolygonBuilder {
     double snap_m = 0.015;
     double probe_px = 3.0;
     double apart_m = 0.04;
+    double goes_on_m = 0.01;
     double most_foreign = 0.05;
     std::int32_t min_tread_columns = 3;
     std::int32_t probes = 5;
@@ -59,6 +60,9 @@ class PolygonBuilder {
       field("probe_px", p.probe_px, 0.0, 20.0,
             "A polygon's end is judged as many pixels of half resolution outside its edge.");
       field("apart_m", p.apart_m, 0.001, 0.5, "What is seen as far in front of a plane hides it.");
+      field(
+          "goes_on_m", p.goes_on_m, 0.0, 0.1,
+          "A surface's own pixel outside its polygon, seen as near to the plane, says that the surface goes on there.");
       field("most_foreign", p.most_foreign, 0.0, 1.0,
             "A polygon of which a larger share of pixels is another plane's is cut back.");
       field("min_tread_columns", p.min_tread_columns, 1, 80, "A tread that ends a riser has as many columns.");
@@ -119,6 +123,7 @@ class PolygonBuilder {
   // The tread that most columns of the surface show right below (or above) it in the picture.
   [[nodiscard]] RegionId tread_beside(bool below) noexcept;
   // All in half-resolution pixels: the edge's ends, a point of the surface.
+  [[nodiscard]] bool is_own(std::int32_t column, std::int32_t row) const noexcept;
   [[nodiscard]] EdgeKind judge_edge(const Vec2& a, const Vec2& b, const Vec2& inside) noexcept;
 
   Params params_;
