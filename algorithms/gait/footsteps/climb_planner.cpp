@@ -322,7 +322,6 @@ ClimbPlanner::Decision ClimbPlanner::walk(const Situation& situation, const Foot
     case LevelStep::Outcome::kSteps:
       decision.has_step = true;
       decision.goal.kind = StepKind::kFloor;
-      decision.goal.walks = true;
       decision.goal.foot = step.foot;
       decision.goal.target = step.target;
       decision.goal.foothold = foothold_at(step.target, footholds.map_stamp_ns);

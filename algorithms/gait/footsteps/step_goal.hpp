@@ -28,7 +28,6 @@ struct StepGoal {
   Foot foot = Foot::kLeft;
   SolePose target;      // odom
   Foothold foothold{};  // the same, as it was found
-  bool walks = false;   // on level ground, to a place
 };
 
 }  // namespace polygmap
