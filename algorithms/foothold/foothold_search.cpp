@@ -188,7 +188,8 @@ void FootholdSearch::link(std::size_t i) noexcept {
     const Vec2 a_m = other.nosing_a_m.head<2>(), b_m = other.nosing_b_m.head<2>();
     // A tread seen in part goes on; the top of a box beside the way does not.
     if (extent_on(tread, a_m, b_m) == Extent::kAside) continue;
-    const bool is_next = tread.along_m(0.5 * (a_m + b_m)) < params_.step_max_m;
+    const double behind_m = tread.along_m(0.5 * (a_m + b_m));  // down stairs the higher ones lie before it
+    const bool is_next = behind_m > 0.0 && behind_m < params_.step_max_m;
     if (is_next && (tread.rise_behind_m == 0.0 || rise_m < tread.rise_behind_m)) tread.rise_behind_m = rise_m;
     add_toe_limit(tread, params_.levels, foot_, {other.nosing_middle_m(), other.left}, other.nosing_margin_m,
                   {params_.back_min_m, params_.back_max_m});
@@ -413,7 +414,17 @@ double FootholdSearch::aim_along_m(const LevelSurface& tread, double left_m, dou
                              : tread.ends.lip  ? down.tread_heel_inset_max_m
                                                : down.floor_heel_inset_max_m;
   const double heel_share = tread.ends.below ? down.heel_share : 0.5;
-  return heel_m + math::clamp(margin_m + heel_share * (spare_m + round_m), 0.0, inset_max_m);
+  const double along_m = heel_m + math::clamp(margin_m + heel_share * (spare_m + round_m), 0.0, inset_max_m);
+  if (!tread.ends.below) return along_m;
+  // A little farther off the lip the heel may stand on what was seen.
+  double seen_m = along_m;
+  for (const FootLimit& near : tread.ends.below->hidden) {
+    const double off_m = -down.hidden_m - std::min(near.clearance_m(tread.at(along_m, left_m)),
+                                                   near.clearance_m(tread.at(along_m, right_m)));
+    seen_m = std::max(seen_m, along_m + off_m / near.inside.inward.dot(tread.heading));
+  }
+  const double room_m = margin_m + spare_m + heel_m - along_m;
+  return std::min(seen_m, along_m + math::clamp(room_m, 0.0, down.seen_inset_m));
 }
 
 Foothold FootholdSearch::foothold_at(const LevelSurface& tread, double along_m, double lateral_m) const noexcept {

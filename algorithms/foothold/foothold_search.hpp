@@ -108,6 +108,7 @@ class FootholdSearch {
     double tread_heel_inset_max_m = 0.030;
     double floor_heel_inset_max_m = 0.032;
     double hidden_m = 0.010;
+    double seen_inset_m = 0.006;
 
     static void visit(auto& p, auto& field) {
       field("drop_max_m", p.drop_max_m, 0.02, 0.5, "A step goes no farther down; below that the legs say.");
@@ -129,6 +130,8 @@ class FootholdSearch {
       field("hidden_m", p.hidden_m, 0.0, 0.05,
             "A surface was seen from this much nearer to the lip than the map tells: an unknown end keeps "
             "`map.sides.unknown_margin_m`.");
+      field("seen_inset_m", p.seen_inset_m, 0.0, 0.1,
+            "The heel goes by as much farther beyond the lip where the lip hid what is nearer.");
     }
   };
   // What may be two steps.
