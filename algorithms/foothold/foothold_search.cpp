@@ -416,15 +416,25 @@ double FootholdSearch::aim_along_m(const LevelSurface& tread, double left_m, dou
   const double heel_share = tread.ends.below ? down.heel_share : 0.5;
   const double along_m = heel_m + math::clamp(margin_m + heel_share * (spare_m + round_m), 0.0, inset_max_m);
   if (!tread.ends.below) return along_m;
-  // A little farther off the lip the heel may stand on what was seen.
-  double seen_m = along_m;
-  for (const FootLimit& near : tread.ends.below->hidden) {
-    const double off_m = -down.hidden_m - std::min(near.clearance_m(tread.at(along_m, left_m)),
-                                                   near.clearance_m(tread.at(along_m, right_m)));
-    seen_m = std::max(seen_m, along_m + off_m / near.inside.inward.dot(tread.heading));
+  // How far along a sole keeps so much from a limit behind it.
+  const auto from_m = [&](const FootLimit& limit, double kept_m) {
+    const double clearance_m =
+        std::min(limit.clearance_m(tread.at(along_m, left_m)), limit.clearance_m(tread.at(along_m, right_m)));
+    return along_m + (kept_m - clearance_m) / limit.inside.inward.dot(tread.heading);
+  };
+  // On a wedge the lip is nearer to one of the feet, and to one corner of its heel. On the margin's very edge the next
+  // search would refuse it.
+  constexpr double kBeyondMargin_m = 0.003;
+  double off_lip_m = along_m;
+  for (const FootLimit& edge : tread.edges) {
+    const bool is_front = edge.inside.inward.dot(tread.heading) > params_.levels.square_cos;
+    if (is_front && !edge.side) off_lip_m = std::max(off_lip_m, from_m(edge, edge.margin_m + kBeyondMargin_m));
   }
-  const double room_m = margin_m + spare_m + heel_m - along_m;
-  return std::min(seen_m, along_m + math::clamp(room_m, 0.0, down.seen_inset_m));
+  // A little farther off the heel may stand on what was seen.
+  double seen_m = off_lip_m;
+  for (const FootLimit& near : tread.ends.below->hidden) seen_m = std::max(seen_m, from_m(near, -down.hidden_m));
+  const double farthest_m = along_m + std::max(margin_m + spare_m + heel_m - along_m, 0.0);
+  return std::min({seen_m, off_lip_m + down.seen_inset_m, farthest_m});
 }
 
 Foothold FootholdSearch::foothold_at(const LevelSurface& tread, double along_m, double lateral_m) const noexcept {
@@ -437,7 +447,10 @@ Foothold FootholdSearch::foothold_at(const LevelSurface& tread, double along_m, 
   out.toe_clearance_m = tread.toe_clearance_m(p);
   out.polygon_id = tread.id;
   out.last_seen_ns = tread.last_seen_ns;
-  out.nosing_distance_m = along_m;
+  const Vec2 out_of_nosing = left_of((tread.nosing_b_m - tread.nosing_a_m).head<2>());
+  const double facing = out_of_nosing.dot(tread.heading);  // of a wedge's two feet one is nearer to it
+  const double slanted_m = out_of_nosing.dot(p - tread.nosing_a_m.head<2>());
+  out.nosing_distance_m = tread.has_nosing && facing > 0.0 ? slanted_m / facing : along_m;
   for (const FootLimit& edge : tread.edges) {
     if (!edge.side) continue;
     const double across = edge.inside.inward.dot(tread.left);
