@@ -45,6 +45,8 @@ Transition WeightShift::tick(const GaitInput& in, GaitShared& gait) noexcept {
       gait.planner.decide(situation(in, planned.kind == StepKind::kLeading, planned.foot), in.footholds);
   if (!decision.has_step) return wait(params);
   if (close_to_planned(params, decision.goal)) return Transition::swing(decision, search_.plan().tried);
+  // With its heel up the foot goes where it was to: the weight would find the way back to a flat foot too long.
+  if (gait.plan.is_on_toe(planned.foot)) return Transition::swing(decision_, search_.plan().tried);
   if (needs_toe_calibration(gait, decision.goal)) return Transition::stand();
   // Over the other foot the weight has its whole way to go.
   const bool same_foot =
