@@ -209,7 +209,9 @@ bool ClimbPlanner::floor_goal(const Situation& situation, const FootholdSet& foo
   goal = {};
   goal.kind = StepKind::kFloor;
   goal.foot = foot;
-  goal.target = floor_step(robot_->sole.collision, stance, foot, torso_goal, half_width_m,
+  // Before a slanted edge one foot stands farther back than the other.
+  const TorsoPose torso_of_its_own = torso_of_foot(to.soles[index_of(foot)], foot, half_width_m, 0.0);
+  goal.target = floor_step(robot_->sole.collision, stance, foot, torso_of_its_own, half_width_m,
                            shortened(params_.floor, floor_.stride_share));
   // On the way, with the heading still wrong, no toe comes near the riser.
   const double short_m = (to.at_lip ? params_.lip.clearance_m : params_.floor_clearance_m) -
