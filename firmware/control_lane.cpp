@@ -86,7 +86,10 @@ OperatorAnswer ControlLane::obey(const OperatorRequest& request, std::int64_t no
   const OperatorCommand command = request.command;
   const ModuleState state = module_state();
   if (!Supervisor::answers(state, command)) return {Refusal::kState, {}};
-  if (command == OperatorCommand::kReset) {
+  if (command == OperatorCommand::kGoTo && !request.destination.is_valid()) return {Refusal::kNoPlace, {}};
+  // At its goal it may be sent on at once.
+  const bool goes_on = command == OperatorCommand::kGoTo && state == ModuleState::kOnTop;
+  if (command == OperatorCommand::kReset || goes_on) {
     if (const OperatorAnswer answer = answer_to_reset(now_ns); !answer.is_obeyed()) return answer;
     const JointVector& q_rad = estimator_.state().q_rad;
     if (!gait_.try_restart(q_rad)) return {Refusal::kJointsAway, gait_.joints_away(q_rad)};
@@ -96,10 +99,7 @@ OperatorAnswer ControlLane::obey(const OperatorRequest& request, std::int64_t no
     if (const OperatorAnswer answer = answer_if_it_stands(now_ns); !answer.is_obeyed()) return answer;
     hand_over_.begin();
   }
-  if (command == OperatorCommand::kGoTo) {
-    if (!request.destination.is_valid()) return {Refusal::kNoPlace, {}};
-    gait_.go_to(request.destination);
-  }
+  if (command == OperatorCommand::kGoTo) gait_.go_to(request.destination);
   if (command == OperatorCommand::kStart) gait_.climb();
   supervisor_.obey(command, state);
   const bool ends = command == OperatorCommand::kStop && state != ModuleState::kArming;

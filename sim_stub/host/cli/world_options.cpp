@@ -36,6 +36,8 @@ void declare_worlds(CLI::App& climb, ClimbOptions& options) {
           .add_option("--world", options.world_file,
                       "A world of boxes with a start and a goal in the staircase's stead, see docs/reference/world.md")
           ->type_name("WORLD.toml");
+  climb.add_flag("--back", options.comes_back,
+                 "At the world's goal it is sent back to where it started, which is its goal from then on");
   std::vector<std::string> names;
   std::string listed = "Kinds of worlds:";
   for (const WorldKind& kind : world_kinds()) {
@@ -54,7 +56,9 @@ void declare_worlds(CLI::App& climb, ClimbOptions& options) {
 
 std::string take_world(const CLI::App& climb, ClimbOptions& options) {
   const std::string option = options.world_kind.empty() ? "--world" : "--kind";
-  if (options.world_kind.empty() && options.world_file.empty()) return {};
+  if (options.world_kind.empty() && options.world_file.empty()) {
+    return options.comes_back ? "--back needs a world with a goal: --world or --kind." : "";
+  }
   for (const char* name : {"--steps", "--rise", "--tread", "--width", "--nosing", "--landing", "--jitter",
                            "--balusters", "--obstacle", "--render-missing-step"}) {
     if (climb.count(name) > 0) return std::string(name) + " is of a staircase, and " + option + " has none.";
@@ -65,6 +69,8 @@ std::string take_world(const CLI::App& climb, ClimbOptions& options) {
   if (options.world_kind.empty()) {
     options.world = read_world(options.world_file);
     check_goal(options);
+    if (options.comes_back && !options.world->world.goal)
+      return "--back needs a goal, and " + options.world_file + " has none.";
     return {};
   }
   const WorldPlan plan = plan_of(options);
@@ -72,6 +78,8 @@ std::string take_world(const CLI::App& climb, ClimbOptions& options) {
   options.world_drawn = plan.what;
   options.world = parse_world(options.world_file, to_toml(plan));
   check_goal(options);
+  if (options.comes_back && !options.world->world.goal)
+    return "--back needs a goal, and this " + options.world_kind + " has none.";
   return {};
 }
 

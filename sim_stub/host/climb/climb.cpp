@@ -233,6 +233,15 @@ std::vector<std::pair<std::string, std::uint32_t>> raised(const Health& health) 
   return out;
 }
 
+// As go_to has it: from the middle between the feet.
+Destination destination_from(const Truth& truth, const WorldPlace& to) {
+  const Transform &left = truth.true_T_sole[0], &right = truth.true_T_sole[1];
+  const double yaw_rad = yaw_of(left.R) + 0.5 * math::wrap_angle(yaw_of(right.R) - yaw_of(left.R));
+  const Vec3 middle_m = 0.5 * (left.p_m + right.p_m);
+  const Vec3 way_m = rotation_z(yaw_rad).transpose() * Vec3{to.x_m - middle_m.x(), to.y_m - middle_m.y(), 0.0};
+  return {way_m.x(), way_m.y(), 0.0, false};
+}
+
 }  // namespace
 
 ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction& progress) {
@@ -248,8 +257,17 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
   std::ostream nobody(nullptr);
   const std::optional<Destination> goal = options.world ? destination_in(*options.world) : std::nullopt;
   std::optional<Dispatcher> dispatcher;
-  ClimbOperator* const climb_operator =
-      options.climb_operator != nullptr || !goal ? options.climb_operator : &dispatcher.emplace(*goal, nobody);
+  Dispatcher::WayBack way_back;
+  std::optional<WorldPlace> sent_to;  // once it is
+  if (options.comes_back) {
+    way_back = [&] {
+      sent_to = WorldPlace{options.world->start.x_m, options.world->start.y_m, std::nullopt, options.world->start.step};
+      return destination_from(robot.truth(), *sent_to);
+    };
+  }
+  ClimbOperator* const climb_operator = options.climb_operator != nullptr || !goal
+                                            ? options.climb_operator
+                                            : &dispatcher.emplace(*goal, nobody, way_back);
   Params params = options.params;
   params.gait.planner.pattern = options.gait;
   params.supervisor.autostart = params.supervisor.autostart && climb_operator == nullptr;
@@ -332,6 +350,10 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
     const Telemetry telemetry = pipeline.telemetry(robot.now_ns(), module->watched);
     live.after_cycle(pipeline.control(), telemetry, timing);
     report.observe(robot.truth(), telemetry);
+    if (sent_to) {
+      report.send_on(*sent_to);
+      sent_to.reset();
+    }
     if (recorder) recorder->observe(robot.truth(), telemetry.state);
     if (lidar.accepted(telemetry.state)) report.observe_lio(lidar.last());
     if (progress && robot.now_ns() >= next_progress_ns) {

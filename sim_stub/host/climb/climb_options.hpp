@@ -33,6 +33,7 @@ struct ClimbOptions {
   std::string world_file;          // that it was read from, or is written to
   std::string world_kind;          // that it was drawn of; empty: of none
   std::string world_drawn;         // and what was, in one sentence
+  bool comes_back = false;         // from the world's goal to where it started
   std::uint64_t seed = 1;
   NoiseKind noise = NoiseKind::kWhite;
   PlantKind plant = PlantKind::kMujoco;

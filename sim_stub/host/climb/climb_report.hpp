@@ -55,6 +55,8 @@ class ClimbReport {
   // Every LIO pose that the module accepted, at its arrival; the truth of its stamp must lie within the last 2 s.
   void observe_lio(const LioSample& sample) { odometry_.observe_lio(sample); }
 
+  // From the world's goal, where it stands, to another one.
+  void send_on(const WorldPlace& goal) { route_.send_on(goal); }
   [[nodiscard]] ClimbSummary finish(const RunFigures& run) const;
   [[nodiscard]] ClimbDrawing drawing() const;
   [[nodiscard]] const StairWorld& world() const { return world_; }

@@ -88,10 +88,15 @@ bool RouteReport::is_at_goal(const WorldPlace& goal) const {
   return !goal.yaw_rad || std::abs(std::remainder(yaw_rad - *goal.yaw_rad, 2.0 * kPi)) <= kGoalWithin_rad;
 }
 
+void RouteReport::send_on(const WorldPlace& goal) {
+  was_at_goal_ = was_at_goal_ && world_.goal && is_at_goal(*world_.goal);
+  world_.goal = goal;
+}
+
 RouteFigures RouteReport::figures() const {
   RouteFigures figures;
   if (world_.goal) {
-    figures.goal_reached = is_at_goal(*world_.goal);
+    figures.goal_reached = was_at_goal_ && is_at_goal(*world_.goal);
     figures.goal_distance_m = distance_m(*world_.goal);
   }
   for (const int step : stood_on_) {

@@ -31,6 +31,8 @@ class RouteReport {
   explicit RouteReport(const StairWorld& world) : world_(world), solids_(solids_of(world)) {}
 
   void observe(const Truth& truth);
+  // It is sent on, to there: the goal is reached by who was at the first one and comes to this one.
+  void send_on(const WorldPlace& goal);
   [[nodiscard]] RouteFigures figures() const;
 
  private:
@@ -43,6 +45,7 @@ class RouteReport {
   StairWorld world_;
   std::vector<SolidBox> solids_;
   Truth last_;
+  bool was_at_goal_ = true;  // at the one before this
   std::uint64_t ticks_ = 0;
   std::array<std::int64_t, kFootCount> stands_since_ns_{-1, -1};
   std::array<int, kFootCount> rests_on_{kNowhere, kNowhere};

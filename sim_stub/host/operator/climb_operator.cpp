@@ -46,9 +46,12 @@ std::optional<OperatorRequest> Dispatcher::next() {
     armed_ = true;
     return OperatorRequest(OperatorCommand::kArm);
   }
-  if (state() != ModuleState::kStanding || sent_) return std::nullopt;
-  sent_ = true;
-  return OperatorRequest(to_);
+  if (state() == ModuleState::kStanding && !sent_) {
+    sent_ = true;
+    return OperatorRequest(to_);
+  }
+  if (state() != ModuleState::kOnTop || !way_back_) return std::nullopt;
+  return OperatorRequest(std::exchange(way_back_, nullptr)());
 }
 
 std::string read_request(const std::string& text, TimedRequest& request) {

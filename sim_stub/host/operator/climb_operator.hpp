@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <iosfwd>
 #include <optional>
 #include <string>
@@ -74,18 +75,23 @@ class ScriptedOperator final : public ClimbOperator {
 // As in "start@4.5"; a sentence where it is none.
 [[nodiscard]] std::string read_request(const std::string& text, TimedRequest& request);
 
-// Arms the robot, and sends it to a place as soon as it stands.
+// Arms the robot, sends it to a place as soon as it stands, and back from there where it is told the way.
 class Dispatcher final : public ClimbOperator {
  public:
-  Dispatcher(const Destination& to, std::ostream& out) : ClimbOperator(out), to_(to) {}
+  using WayBack = std::function<Destination()>;  // from where it stands when it is asked
+  Dispatcher(const Destination& to, std::ostream& out, WayBack way_back = {})
+      : ClimbOperator(out), to_(to), way_back_(std::move(way_back)) {}
 
-  [[nodiscard]] bool has_more() const override { return !sent_; }
+  [[nodiscard]] bool has_more() const override {
+    return !sent_ || (way_back_ && state() != ModuleState::kSafeStop && state() != ModuleState::kFallen);
+  }
 
  private:
   void listen() override {}
   [[nodiscard]] std::optional<OperatorRequest> next() override;
 
   Destination to_;
+  WayBack way_back_;  // until it was sent
   bool armed_ = false, sent_ = false;
 };
 
