@@ -73,6 +73,7 @@ void ClimbPlanner::reset(const Params& params, const RobotModel& robot) noexcept
   std::construct_at(this);  // in place: another one would take kilobytes of stack
   params_ = params;
   robot_ = &robot;
+  reach_over_lip_m_ = params.lip.far_m;
 }
 
 void ClimbPlanner::restart() noexcept {
@@ -80,6 +81,7 @@ void ClimbPlanner::restart() noexcept {
   floor_.steps = floor_.corrections = 0;
   way_.forget();
   passing_refused_ = closes_up_ = false;
+  reach_over_lip_m_ = params_.lip.far_m;
   odom_stood_.reset();
   slid_.reset();
   set_back_ = 0;
@@ -183,11 +185,14 @@ bool ClimbPlanner::lined_up(const Situation& situation, const StandOff& to, std:
              (to.at_lip ? params_.lip.min_stand_off_m : params_.min_stand_off_m);
 }
 
-bool ClimbPlanner::far_from_lip(const Situation& situation, const FootholdSet& footholds) const noexcept {
+double ClimbPlanner::to_lip_m(const Situation& situation, const FootholdSet& footholds) const noexcept {
   const StandOff to = stand_off(situation, footholds);
-  return to.at_lip && std::any_of(situation.soles.begin(), situation.soles.end(), [&](const SolePose& sole) {
-           return toe_to_line_m(robot_->sole.collision, sole, to.nosing, to.yaw_rad) > params_.lip.far_m;
-         });
+  double farthest_m = 0.0;
+  for (const SolePose& sole : situation.soles) {
+    if (!to.at_lip) break;
+    farthest_m = std::max(farthest_m, toe_to_line_m(robot_->sole.collision, sole, to.nosing, to.yaw_rad));
+  }
+  return farthest_m;
 }
 
 bool ClimbPlanner::floor_goal(const Situation& situation, const FootholdSet& footholds, StepGoal& goal) const noexcept {
@@ -249,6 +254,12 @@ StepGoal ClimbPlanner::closing_goal(const Situation& situation, const FootholdSe
   goal.foothold = foothold_at(goal.target, footholds.map_stamp_ns);
   goal.foothold.polygon_id = tread_id_;
   return goal;
+}
+
+bool ClimbPlanner::come_nearer(const Decision& leading) noexcept {
+  if (!on_treads_ || leading.to_lip_m <= params_.lip.near_m) return false;
+  reach_over_lip_m_ = params_.lip.near_m;
+  return true;
 }
 
 bool ClimbPlanner::close_up(const Situation& situation) noexcept {
@@ -384,7 +395,8 @@ ClimbPlanner::Decision ClimbPlanner::decide(const Situation& situation, const Fo
     decision.obstruction = StopReason::kMapStale;
     return decision;
   }
-  const bool lines_up = !on_treads_ || far_from_lip(situation, footholds);
+  decision.to_lip_m = to_lip_m(situation, footholds);
+  const bool lines_up = !on_treads_ || decision.to_lip_m > reach_over_lip_m_;
   if (lines_up && floor_goal(situation, footholds, decision.goal)) {
     decision.has_step = floor_.corrections < params_.line_up.max_corrections && floor_.steps < params_.max_floor_steps;
     if (decision.has_step) return decision;

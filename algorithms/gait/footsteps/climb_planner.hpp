@@ -62,15 +62,19 @@ class ClimbPlanner {
     double stand_off_m = 0.014;
     double min_stand_off_m = 0.006;
     double clearance_m = 0.006;
-    double far_m = 0.035;
+    double far_m = 0.08;
+    double near_m = 0.035;
 
     static void visit(auto& p, auto& field) {
       field("stand_off_m", p.stand_off_m, 0.0, 0.3, "Collision toe to the lip.");
       field("min_stand_off_m", p.min_stand_off_m, 0.0, 0.3, "Nearer is not lined up, whatever the tolerance.");
       field.ordered("min_stand_off_m", "stand_off_m");
       field("clearance_m", p.clearance_m, 0.0, 0.5, "Clearance of a toe from the lip on the way.");
-      field("far_m", p.far_m, 0.0, 0.5,
-            "From farther off it comes nearer first, on a deep tread, too: the legs reach no farther down.");
+      field("far_m", p.far_m, 0.0, 0.5, "From farther off it comes nearer first, on a deep tread, too.");
+      field(
+          "near_m", p.near_m, 0.0, 0.5,
+          "Where the legs refuse a step from farther off, it comes nearer first, and on the treads that follow, too.");
+      field.ordered("near_m", "far_m");
     }
   };
   // When the feet are lined up before the stairs.
@@ -168,7 +172,8 @@ class ClimbPlanner {
     StepGoal trailing;                           // the step that may come after a leading or passing one
     StopReason obstruction = StopReason::kNone;  // without a step: why
     double measured_m = 0.0;
-    double rise_m = 0.0;  // of a leading step, negative down
+    double rise_m = 0.0;    // of a leading step, negative down
+    double to_lip_m = 0.0;  // of the foot that is farther from the lip that it leads over
   };
 
   // robot: outlives the planner.
@@ -192,6 +197,8 @@ class ClimbPlanner {
   bool shorten_floor_steps() noexcept;
   // The legs cannot pass the standing foot: the next step ends beside it.
   void refuse_passing() noexcept { passing_refused_ = true; }
+  // The legs cannot do that leading step. False when it begins as near to the lip as it may.
+  [[nodiscard]] bool come_nearer(const Decision& leading) noexcept;
   // The legs cannot lead on. A foot that landed farther out, in a stance too wide for the ankle rolls of both legs,
   // comes back beside the other one first. False when the feet are close enough already.
   [[nodiscard]] bool close_up(const Situation& situation) noexcept;
@@ -230,7 +237,8 @@ class ClimbPlanner {
   struct StandOff;
   [[nodiscard]] StandOff stand_off(const Situation& situation, const FootholdSet& footholds) const noexcept;
   [[nodiscard]] bool lined_up(const Situation& situation, const StandOff& to, std::size_t foot) const noexcept;
-  [[nodiscard]] bool far_from_lip(const Situation& situation, const FootholdSet& footholds) const noexcept;
+  // Of the foot that is farther from it; 0 where it leads over none.
+  [[nodiscard]] double to_lip_m(const Situation& situation, const FootholdSet& footholds) const noexcept;
   [[nodiscard]] Foot leading_foot(const Situation& situation, const SolePair& targets) const noexcept;
 
   Params params_;
@@ -254,6 +262,7 @@ class ClimbPlanner {
   bool split_stance_ = false;  // the leading foot stands on a tread, the other one below: the trailing step ends this
   bool passing_refused_ = false;
   bool closes_up_ = false;
+  double reach_over_lip_m_ = 0.0;       // from so far off the legs have not refused to go down yet
   SolePose landed_;                     // where the foot that landed last was to
   std::optional<SolePair> odom_stood_;  // both soles when it landed
   std::optional<Foot> slid_;            // since then, and is to be set back

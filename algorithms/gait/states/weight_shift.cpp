@@ -62,6 +62,7 @@ Transition WeightShift::legs_cannot(const GaitInput& in, GaitShared& gait) const
     return Transition::shift(gait.planner.decide(situation(in), in.footholds), false);
   }
   if (kind == StepKind::kFloor && gait.planner.shorten_floor_steps()) return Transition::stand();
+  if (kind == StepKind::kLeading && gait.planner.come_nearer(decision_)) return Transition::stand();
   gait.memory.rests_first = true;
   if (++gait.memory.refusals < gait.params.weight_shift.max_refusals) return Transition::stand();
   if (kind == StepKind::kClosing && gait.planner.leave_slid_foot()) {
