@@ -48,6 +48,19 @@ TEST(WorldClimb, TwoBoxesThatAreStairs_GoalIsReachedAndWhatItStoodOnIsTold) {
   EXPECT_GT(s.route.body_clearance_min_m, 0.0);
 }
 
+// Without a reset: at its goal it is sent on.
+TEST(WorldClimb, SentBackFromItsGoal_TurnsAndGoesDownTheSameStairs) {
+  ClimbOptions options = in_world(kOnTheFloor + solid("low", 0.0, 0.3, 0.13) + solid("high", 0.3, 1.6, 0.26) +
+                                      "[goal]\nx = 0.8\ny = 0\nsurface = \"high\"\n",
+                                  3);
+  options.comes_back = true;
+  const ClimbSummary s = run_climb(options, {});
+  EXPECT_TRUE(s.pass) << s.reason;
+  EXPECT_EQ(s.route.goal_reached, true);
+  EXPECT_EQ(s.route.surfaces_stood_on, (std::vector<std::string>{"floor", "low", "high", "low", "floor"}));
+  EXPECT_GT(s.sole_margin_min_m, 0.004);
+}
+
 // The page lays the lidar's own world on the true one: its way lies where the base's does.
 TEST(WorldClimb, Recorded_ReportHasTheSolidsAndTheLidarsWay) {
   const std::string path = testing::TempDir() + "/polygmap_world_" + std::to_string(::getpid()) + ".mcap";

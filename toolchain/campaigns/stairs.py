@@ -27,6 +27,7 @@ KINDS = {
     "up-high": Bars((4, 9), 4, (2.8, 1.7), 1),
     "up-nosing": Bars((5, 9), 5, (2.6, 1.5)),
     "up-open": Bars((5, 9), 5, (2.6, 1.5)),
+    "up-back": Bars((5, 10), 4, gaits=DS),
     "down": Bars((5, 10), 4, (3.0, 1.8), 0.98),
     "down-high": Bars((5, 10), 4, (3.4, None), 1, DS),
     "down-open": Bars((5, 9), 5, (2.6, 1.5)),
@@ -41,6 +42,8 @@ KINDS = {
     "approach": Bars((4, 9), gaits=DS),
     "trap": Bars((None, None), gaits=DS),
 }
+# Of what is not a kind of the simulation's own name: there and back.
+WORLDS = {"up-back": ("--kind", "up", "--back")}
 # Traps that nobody can go through or round, and words of what is true there. In all other worlds a stop is a miss, whatever
 # it says: the way to the goal is free.
 STOPS = {
@@ -181,7 +184,7 @@ def unsafe_runs(groups):
 
 
 def runs_of(seeds):
-    return {kind: [["--kind", kind, "--gait", gait, "--noise", own_noise(s), "--seed", s, "--reality", 1] for gait in bars.gaits for s in seeds]
+    return {kind: [[*WORLDS.get(kind, ("--kind", kind)), "--gait", gait, "--noise", own_noise(s), "--seed", s, "--reality", 1] for gait in bars.gaits for s in seeds]
             for kind, bars in KINDS.items()}
 
 

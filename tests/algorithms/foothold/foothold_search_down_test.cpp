@@ -128,5 +128,37 @@ TEST_F(FootholdSearchDown, TreadTooShortForTheFoot_IsSaidWithItsDepth) {
   EXPECT_NEAR(r.measured_tread_m, 0.23, 1e-9);
 }
 
+// Its nosing is seen, as on open stairs, and no shin leans over it.
+TEST_F(FootholdSearchDown, HigherTreadBehind_IsNoRiseAheadOfTheFeet) {
+  MapSnapshot map = platform_map(0.13);
+  const double alone_m = search(map, before_lip()).p_star_feet[0].position_m.x();
+  MapPolygon higher = surface_at(4, 0.13, -1.3, -0.3, true);
+  higher.surface.nosing = {higher.surface.polygon[3], higher.surface.polygon[0], 0.001, true};
+  EXPECT_TRUE(map.polygons.try_push_back(higher));
+  const FootholdSet& r = search(map, before_lip());
+  ASSERT_EQ(r.obstruction, StopReason::kNone) << name_of(r.obstruction);
+  EXPECT_NEAR(r.p_star_feet[0].position_m.x(), alone_m, 1e-9);
+}
+
+TEST_F(FootholdSearchDown, WedgeBelow_BothHeelsKeepTheirMarginAndTheirWayFromTheLipIsTold) {
+  constexpr double kDeep_m = 0.33, kSlant_m = 0.10;  // 0.2 rad between its two edges
+  MapSnapshot map = platform_map(0.13);
+  SurfacePatch& wedge = map.polygons[1].surface;
+  wedge.polygon[1].x() = kLip_x_m + kDeep_m + kSlant_m;
+  wedge.polygon[2].x() = kLip_x_m + kDeep_m - kSlant_m;
+  wedge.back = {wedge.polygon[2], wedge.polygon[1], 0.001, true};
+  const FootholdSet& r = search(map, before_lip());
+  ASSERT_EQ(r.obstruction, StopReason::kNone) << name_of(r.obstruction);
+  for (const Foothold& f : r.p_star_feet) {
+    EXPECT_GT(f.yaw_rad, 0.05) << "between the headings of its edges";
+    const Transform odom_T_sole{rotation_z(f.yaw_rad), f.position_m};
+    for (const double side : {-1.0, 1.0}) {
+      const Vec3 heel_m = odom_T_sole * Vec3{kCollisionRectangle.heel_x_m, side * kCollisionRectangle.half_width_m, 0};
+      EXPECT_GT(heel_m.x() - kLip_x_m, FootholdSearch::Params{}.margin.of(0.001));
+    }
+    EXPECT_NEAR(f.nosing_distance_m, (f.position_m.x() - kLip_x_m) / std::cos(f.yaw_rad), 1e-6);
+  }
+}
+
 }  // namespace
 }  // namespace polygmap

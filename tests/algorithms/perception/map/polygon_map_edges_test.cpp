@@ -188,6 +188,44 @@ TEST_F(PolygonMapEdges, AnotherEdgeIsTheFrontOneFromHere_BecomesTheNosing) {
   EXPECT_NEAR(see(front, 12).x(), 0.28, 0.01);
 }
 
+// A leg before the camera splits a tread in two, and each part seems to end there.
+TEST_F(PolygonMapEdges, EndThatALegMakes_IsNoneWhileTheTreadIsSeenToGoOn) {
+  const Transform camera = looking_down({0, 0, 1});
+  SurfacePatch whole = level_patch({0, 0, 0}, 0.14, 0.3);
+  whole.edges.fill(EdgeKind::kUnknown);
+  const SurfacePatch part = level_patch({0.05, 0, 0}, 0.09, 0.3), other_part = level_patch({0.1, 0, 0}, 0.04, 0.3);
+  const auto near_end_m = [&](const SurfacePatch& patch) {
+    stamp_ns_ += kFrame_ns;
+    fuse(in_camera({patch}, camera, stamp_ns_), camera);
+    return -extreme(map_->snapshot().polygons[0], -Vec3::UnitX());
+  };
+  const double seen_m = -0.14 + PolygonMap::Params{}.sides.unknown_margin_m;
+  for (int i = 0; i < 10; ++i) near_end_m(whole);
+  for (int i = 0; i < 12; ++i) EXPECT_NEAR(near_end_m(i % 3 == 2 ? whole : part), seen_m, 1e-3) << "it was seen beyond";
+  for (int i = 0; i < 12; ++i) EXPECT_NEAR(near_end_m(i % 2 == 0 ? part : other_part), seen_m, 1e-3) << "they disagree";
+  for (int i = 0; i < 8; ++i) near_end_m(part);
+  EXPECT_NEAR(near_end_m(part), -0.04, 1e-3) << "who says so again and again is right";
+}
+
+// A frame mistook the lip of a tread that is gone down for its nosing, which would make all of it lie before its back.
+TEST_F(PolygonMapEdges, LipThatFacesTheOtherWay_TurnsTheAxes) {
+  const Transform camera = looking_down({0, 0, 1});
+  SurfacePatch patch = level_patch({0, 0, 0}, 0.14, 0.3);
+  const EdgeLine lip{{-0.14, 0.3, 0}, {-0.14, -0.3, 0}, 0.001, true};
+  for (int i = 0; i < 12; ++i) {
+    patch.nosing = i == 0 ? lip : EdgeLine{};
+    patch.back = i == 0 ? EdgeLine{} : lip;
+    patch.back_drops = i > 0;
+    stamp_ns_ += kFrame_ns;
+    fuse(in_camera({patch}, camera, stamp_ns_), camera);
+  }
+  const SurfacePatch& told = map_->snapshot().polygons[0].surface;
+  EXPECT_NEAR(told.area_m2, 0.28 * 0.6, 1e-3);
+  EXPECT_TRUE(told.back.valid && told.back_drops);
+  EXPECT_NEAR(told.back.a_m.x(), -0.14, 1e-3);
+  EXPECT_FALSE(told.nosing.valid);
+}
+
 TEST_F(PolygonMapEdges, NosingBehindTheBackEdge_FallsBackToTheEndsAndIsCounted) {
   const Transform camera = looking_down({0, 0, 1});
   SurfacePatch patch = level_patch({0, 0, 0}, 0.14, 0.3);
