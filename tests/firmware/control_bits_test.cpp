@@ -200,11 +200,11 @@ TEST(ControlBits, ClimbOfNoisyInputs_GivesTheRecordedBits) {
   // Estimate, map, footholds, plan and swings all took part.
   EXPECT_GE(pipeline->control().gait_status().treads_climbed, 1U);
   // Recorded anew when a result changes on purpose, and then the same in presets release and orin.
-  EXPECT_EQ(hashes.estimates.value(), 7560774255052636063U);
-  EXPECT_EQ(hashes.gait.value(), 8802459093668642018U);
-  EXPECT_EQ(hashes.commands.value(), 11944217714530839775U);
-  EXPECT_EQ(hashes.surfaces.value(), 3210994534908186464U);
-  EXPECT_EQ(hashes.map.value(), 15530596507192438832U);
+  EXPECT_EQ(hashes.estimates.value(), 16271003599626058444U);
+  EXPECT_EQ(hashes.gait.value(), 2947607797089606505U);
+  EXPECT_EQ(hashes.commands.value(), 6119465006444569621U);
+  EXPECT_EQ(hashes.surfaces.value(), 15142764443487149569U);
+  EXPECT_EQ(hashes.map.value(), 5187151138975696787U);
 }
 
 }  // namespace
