@@ -83,7 +83,7 @@ inline constexpr auto kOperatorTransitions = std::to_array<OperatorTransition>({
     {ModuleState::kHolding, OperatorCommand::kStop, ModuleState::kStopping},
     {ModuleState::kSafeStop, OperatorCommand::kReset, ModuleState::kStanding, ", once what stopped it is over"},
     {ModuleState::kOnTop, OperatorCommand::kReset, ModuleState::kStanding},
-    {ModuleState::kOnTop, OperatorCommand::kGoTo, ModuleState::kWalkingUp, ", or climbing where it was"},
+    {ModuleState::kOnTop, OperatorCommand::kGoTo, ModuleState::kClimbing, ", or walking_up where it was"},
     {ModuleState::kOnTop, OperatorCommand::kStop, ModuleState::kSafeStop},
     {ModuleState::kStanding, OperatorCommand::kHandOver, ModuleState::kHandingOver},
     {ModuleState::kSafeStop, OperatorCommand::kHandOver, ModuleState::kHandingOver, ", if it balances"},

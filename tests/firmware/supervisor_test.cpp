@@ -36,7 +36,7 @@ TEST(Supervisor, EveryCommandInEveryState_IsObeyedWhereItMeansSomething) {
       {ModuleState::kStanding, "no yes no no yes no yes yes"}, {ModuleState::kWalkingUp, "no no yes no yes no no yes"},
       {ModuleState::kClimbing, "no no yes no yes no no yes"},  {ModuleState::kHolding, "no no no yes yes no no no"},
       {ModuleState::kStopping, "no no no no no no no no"},     {ModuleState::kSafeStop, "no no no no no yes yes no"},
-      {ModuleState::kOnTop, "no no no no yes yes yes no"},     {ModuleState::kFallen, "no no no no no no no no"},
+      {ModuleState::kOnTop, "no no no no yes yes yes yes"},    {ModuleState::kFallen, "no no no no no no no no"},
       {ModuleState::kHandingOver, "no no no no yes no no no"}, {ModuleState::kReleased, "no no no no no no no no"}};
   ASSERT_EQ(obeyed.size(), kModuleStateTable.size());
   for (const auto& [state, expected] : obeyed) {
@@ -93,7 +93,8 @@ struct Case {
     const bool stands_on = command == Command::kHandOver && before == ModuleState::kStanding;
     if (ends || stands_on) gait.stop_requested = true;
     if (stands_on) gait.phase = GaitPhase::kStopped;  // at once: no foot is in the air
-    if (command == Command::kReset) gait.phase = GaitPhase::kStandstill, gait.stop_requested = false;
+    const bool goes_on = command == Command::kGoTo && before == ModuleState::kOnTop;
+    if (command == Command::kReset || goes_on) gait.phase = GaitPhase::kStandstill, gait.stop_requested = false;
     supervisor.obey(command, before);
   }
   void happen(StateEvent event) {

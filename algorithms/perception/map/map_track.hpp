@@ -92,8 +92,10 @@ struct MapTrack {
   SurfaceKind kind = SurfaceKind::kOther;
   std::uint32_t sightings = 0;
   std::uint32_t misses = 0;
-  std::uint32_t outliers = 0;      // consecutive sightings of its plane elsewhere
-  std::uint32_t other_fronts = 0;  // consecutive sightings of lines that face another way
+  struct {
+    std::uint32_t planes = 0;  // consecutive sightings of its plane elsewhere
+    std::uint32_t fronts = 0;  // and of lines that face another way
+  } outliers;
   std::int64_t last_seen_ns = 0;
   Viewpoint seen_from;
   Transform map_T_local;  // z out of the surface; level: x up the stairs, y left; upright: y up

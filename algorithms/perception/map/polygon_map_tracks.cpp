@@ -33,7 +33,7 @@ void PolygonMap::fuse_best() noexcept {
   const bool outlier = std::abs(offset_m) > params_.lines.gate_max_m;
   if (outlier) {
     ++counters_.plane_outliers;
-    if (++keep->outliers < params_.outliers_to_reset) return;
+    if (++keep->outliers.planes < params_.outliers_to_reset) return;
     ++counters_.resets;
   }
   if (gone != nullptr) merge(*keep, *gone);
@@ -121,7 +121,7 @@ void PolygonMap::fuse(MapTrack& track, double offset_m, double fade) noexcept {
   track.last_seen_ns = newest_ns_;
   track.seen_from = viewpoint();
   track.misses = 0;
-  track.outliers = 0;
+  track.outliers.planes = 0;
   track.rmse_m += params_.rmse_gain * (seen_.rmse_m - track.rmse_m);
   track.invalid_fraction = seen_.invalid_fraction;
 
@@ -162,13 +162,13 @@ bool PolygonMap::faces_as(MapTrack& track) noexcept {
   if (!heading) return true;
   const bool has_lines = track.nosing.sightings > 0 || track.back.sightings > 0;
   if (has_lines && heading->dot(track.map_T_local.R.col(0)) >= kAside_cos) {
-    track.other_fronts = 0;
+    track.outliers.fronts = 0;
     return true;
   }
   const std::uint32_t sure = params_.lines.min_sightings;
   const bool is_sure = track.nosing.sightings >= sure || track.back.sightings >= sure;
-  if (is_sure && ++track.other_fronts < params_.outliers_to_reset) return false;
-  track.other_fronts = 0;
+  if (is_sure && ++track.outliers.fronts < params_.outliers_to_reset) return false;
+  track.outliers.fronts = 0;
   track.nosing = track.back = {};
   track.back_drops = 0;
   turn_to(track, *heading);
