@@ -416,25 +416,8 @@ double FootholdSearch::aim_along_m(const LevelSurface& tread, double left_m, dou
   const double heel_share = tread.ends.below ? down.heel_share : 0.5;
   const double along_m = heel_m + math::clamp(margin_m + heel_share * (spare_m + round_m), 0.0, inset_max_m);
   if (!tread.ends.below) return along_m;
-  // How far along a sole keeps so much from a limit behind it.
-  const auto from_m = [&](const FootLimit& limit, double kept_m) {
-    const double clearance_m =
-        std::min(limit.clearance_m(tread.at(along_m, left_m)), limit.clearance_m(tread.at(along_m, right_m)));
-    return along_m + (kept_m - clearance_m) / limit.inside.inward.dot(tread.heading);
-  };
-  // On a wedge the lip is nearer to one of the feet, and to one corner of its heel. On the margin's very edge the next
-  // search would refuse it.
-  constexpr double kBeyondMargin_m = 0.003;
-  double off_lip_m = along_m;
-  for (const FootLimit& edge : tread.edges) {
-    const bool is_front = edge.inside.inward.dot(tread.heading) > params_.levels.square_cos;
-    if (is_front && !edge.side) off_lip_m = std::max(off_lip_m, from_m(edge, edge.margin_m + kBeyondMargin_m));
-  }
-  // A little farther off the heel may stand on what was seen.
-  double seen_m = off_lip_m;
-  for (const FootLimit& near : tread.ends.below->hidden) seen_m = std::max(seen_m, from_m(near, -down.hidden_m));
   const double farthest_m = along_m + std::max(margin_m + spare_m + heel_m - along_m, 0.0);
-  return std::min({seen_m, off_lip_m + down.seen_inset_m, farthest_m});
+  return std::min(off_lip_m(tread, along_m, left_m, right_m), farthest_m);
 }
 
 Foothold FootholdSearch::foothold_at(const LevelSurface& tread, double along_m, double lateral_m) const noexcept {

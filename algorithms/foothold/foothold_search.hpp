@@ -303,6 +303,9 @@ class FootholdSearch {
   [[nodiscard]] const Lip* lip_ahead() const noexcept;
   // What lies below it; kNone: nothing that was seen.
   [[nodiscard]] std::size_t level_below(const Lip& lip) const noexcept;
+  // Where the heels of soles that come down over the lip keep their margin from it, from so far along on.
+  [[nodiscard]] double off_lip_m(const LevelSurface& tread, double along_m, double left_m,
+                                 double right_m) const noexcept;
   [[nodiscard]] StopReason judge_below(const Lip& lip, std::size_t level) noexcept;
   void choose_up() noexcept;
 

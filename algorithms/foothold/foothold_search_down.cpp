@@ -46,6 +46,29 @@ std::size_t FootholdSearch::level_below(const Lip& lip) const noexcept {
   return highest;
 }
 
+double FootholdSearch::off_lip_m(const LevelSurface& tread, double along_m, double left_m,
+                                 double right_m) const noexcept {
+  // How far along a sole keeps so much from a limit behind it.
+  const auto from_m = [&](const FootLimit& limit, double kept_m) {
+    const double clearance_m =
+        std::min(limit.clearance_m(tread.at(along_m, left_m)), limit.clearance_m(tread.at(along_m, right_m)));
+    return along_m + (kept_m - clearance_m) / limit.inside.inward.dot(tread.heading);
+  };
+  // On a wedge the lip is nearer to one of the feet, and to one corner of its heel. On the margin's very edge the next
+  // search would refuse it.
+  constexpr double kBeyondMargin_m = 0.003;
+  double off_m = along_m;
+  for (const FootLimit& edge : tread.edges) {
+    const bool is_front = edge.inside.inward.dot(tread.heading) > params_.levels.square_cos;
+    if (is_front && !edge.side) off_m = std::max(off_m, from_m(edge, edge.margin_m + kBeyondMargin_m));
+  }
+  // A little farther off the heel may stand on what was seen.
+  double seen_m = off_m;
+  for (const FootLimit& near : tread.ends.below->hidden)
+    seen_m = std::max(seen_m, from_m(near, -params_.down.hidden_m));
+  return std::min(seen_m, off_m + params_.down.seen_inset_m);
+}
+
 StopReason FootholdSearch::judge_below(const Lip& lip, std::size_t level) noexcept {
   const Lip over = lip;  // of a level that may be the one that is prepared anew
   LevelSurface& tread = levels_[level];
