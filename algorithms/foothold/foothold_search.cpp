@@ -620,7 +620,7 @@ StopReason FootholdSearch::judge_tread(const LevelSurface& tread, double from_he
   const StopReason placed = place_feet(tread, feet);
   if (placed != StopReason::kNone) return placed;
   const Foothold& foot = feet[index_of(query_.stance)];
-  if (foot.nosing_distance_m - tread.along_m(from_p_m) > step_max_m) return StopReason::kNoStaircase;
+  if (tread.along_m(foot.position_m.head<2>()) - tread.along_m(from_p_m) > step_max_m) return StopReason::kNoStaircase;
   return judge_feet(tread, feet);
 }
 

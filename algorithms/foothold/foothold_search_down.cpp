@@ -65,7 +65,7 @@ double FootholdSearch::off_lip_m(const LevelSurface& tread, double along_m, doub
   // A little farther off the heel may stand on what was seen.
   double seen_m = off_m;
   for (const FootLimit& near : tread.ends.below->hidden)
-    seen_m = std::max(seen_m, from_m(near, -params_.down.hidden_m));
+    seen_m = std::max(seen_m, from_m(near, kBeyondMargin_m - params_.down.hidden_m));
   return std::min(seen_m, off_m + params_.down.seen_inset_m);
 }
 

@@ -49,7 +49,7 @@ void add_sole(Xml& xml, const char* side, const RobotErrors& errors, double ankl
   const SoleRectangle& sole = errors.sole.collision;
   constexpr double kWorn_m = 0.004;
   constexpr double kLeast_m = 1e-3;  // of a box's half width
-  constexpr int kInscribed = 4;      // boxes in a disc: 2 % of its radius are left out at most
+  constexpr int kInscribed = 4;  // boxes in a disc: none of them is as much as 2 % of its radius short in its direction
   const double round_m = std::min(errors.toe_round_m, sole.half_width_m - kLeast_m), worn_m = errors.sole_edge_m;
   const auto box = [&](double from_x_m, double to_x_m, double half_width_m, double above_m, double y_m = 0.0) {
     xml.add("<geom class='%s' type='box' pos='%.9g %.9g %.9g' size='%.9g %.9g %.9g'/>", side, 0.5 * (from_x_m + to_x_m),

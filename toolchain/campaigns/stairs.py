@@ -42,7 +42,7 @@ KINDS = {
     "approach": Bars((4, 9), gaits=DS),
     "trap": Bars((None, None), gaits=DS),
 }
-# Of what is not a kind of the simulation's own name: there and back.
+# The arguments of what is no kind of the tool's: up, and back down the same flight.
 WORLDS = {"up-back": ("--kind", "up", "--back")}
 # Traps that nobody can go through or round, and words of what is true there. In all other worlds a stop is a miss, whatever
 # it says: the way to the goal is free.

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 
 #include "algorithms/core/math/transform.hpp"
 #include "algorithms/core/messages/surfaces.hpp"
@@ -67,7 +68,7 @@ struct TrackedSide {
   double reach_m = 0.0;  // of the last sighting: one frame alone does not make an unknown end grow
   double information = 0.0;
   std::int64_t seen_ns = 0;
-  double outlier_m = 0.0;  // where the last outlier had it
+  std::optional<double> outlier_m;  // where the last sighting had an end that contradicts it
   std::uint32_t outliers = 0;
   bool observed = false;
 };
@@ -94,7 +95,7 @@ struct MapTrack {
   std::uint32_t misses = 0;
   struct {
     std::uint32_t planes = 0;  // consecutive sightings of its plane elsewhere
-    std::uint32_t fronts = 0;  // and of lines that face another way
+    std::uint32_t fronts = 0;  // of its lines, as many that face another way since one faced this way
   } outliers;
   std::int64_t last_seen_ns = 0;
   Viewpoint seen_from;

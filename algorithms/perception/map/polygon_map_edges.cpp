@@ -51,6 +51,7 @@ void PolygonMap::turn_to(MapTrack& track, const Vec3& map_x) noexcept {
     const auto from = static_cast<std::size_t>((static_cast<int>(k) + shift + 2 * static_cast<int>(kMapSides)) %
                                                static_cast<int>(kMapSides));
     track.sides[k] = old[from];
+    track.sides[k].outlier_m.reset();  // of another direction
     track.sides[k].support_m = track.sides[k].reach_m = support_m(track.polygon, side_direction(k));
   }
   for (TrackedLine* line : {&track.nosing, &track.back}) {
@@ -137,8 +138,8 @@ void PolygonMap::update_side(TrackedSide& side, double seen_m, bool observed) no
   // Certainly surface up to here, in this frame and in the one before.
   const double seen_reach_m = seen_m - params_.sides.unknown_margin_m;
   const double reach_m = std::min(seen_reach_m, std::exchange(side.reach_m, seen_reach_m));
-  // What was taken for the end was not where the surface is seen to go on: a leg split it there.
-  if (!observed && seen_reach_m > side.outlier_m) side.outliers = 0;
+  // Where the surface is seen to go on beyond such an end, a leg split it there.
+  if (!observed && side.outlier_m && seen_reach_m > *side.outlier_m) side.outliers = 0;
   if (!observed && !side.observed) {
     side.support_m = std::max(side.support_m, reach_m);
     return;
@@ -156,11 +157,16 @@ void PolygonMap::update_side(TrackedSide& side, double seen_m, bool observed) no
   const bool extends = observed && !side.observed && seen_m > side.support_m;
   if (!extends) {
     ++counters_.side_outliers;
-    if (std::abs(seen_m - std::exchange(side.outlier_m, seen_m)) > params_.sides.gate_m) side.outliers = 0;
+    if (observed) {  // other ends than the last one's say nothing together; who sees beyond an end says so anyhow
+      if (!side.outlier_m || std::abs(seen_m - *side.outlier_m) > params_.sides.gate_m) side.outliers = 0;
+      side.outlier_m = seen_m;
+    } else {
+      side.outlier_m.reset();
+    }
     if (++side.outliers < params_.outliers_to_reset) return;
     ++counters_.resets;
   }
-  side = {observed ? seen_m : reach_m, seen_reach_m, weight, newest_ns_, 0.0, 0, observed};
+  side = {observed ? seen_m : reach_m, seen_reach_m, weight, newest_ns_, {}, 0, observed};
 }
 
 void PolygonMap::rebuild(MapTrack& track) noexcept {

@@ -114,7 +114,6 @@ Outline2 PolygonBuilder::seen_of(const Outline2& flat) noexcept {
   return seen;
 }
 
-// By its column and its row in the whole picture.
 bool PolygonBuilder::is_own(std::int32_t column, std::int32_t row) const noexcept {
   const RegionId label = regions_->labels.at(column, row);
   return label != kNoRegion && (*regions_)[label].coplanar == own().coplanar;

@@ -119,11 +119,12 @@ class PolygonBuilder {
   void add_patch() noexcept;
   // Nothing where the piece has no area.
   [[nodiscard]] std::optional<SurfacePatch> patch_of(Piece& piece) noexcept;
+  // By its column and its row in the whole picture.
+  [[nodiscard]] bool is_own(std::int32_t column, std::int32_t row) const noexcept;
   void judge_edges(const Piece& piece, SurfacePatch& patch) noexcept;
   // The tread that most columns of the surface show right below (or above) it in the picture.
   [[nodiscard]] RegionId tread_beside(bool below) noexcept;
   // All in half-resolution pixels: the edge's ends, a point of the surface.
-  [[nodiscard]] bool is_own(std::int32_t column, std::int32_t row) const noexcept;
   [[nodiscard]] EdgeKind judge_edge(const Vec2& a, const Vec2& b, const Vec2& inside) noexcept;
 
   Params params_;

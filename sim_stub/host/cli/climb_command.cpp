@@ -346,6 +346,9 @@ std::string operator_complaint(ClimbArguments& a) {
     }
     a.options.asked.push_back(request);
   }
+  if (a.options.comes_back && (a.keyboard || !a.options.asked.empty())) {
+    return "--back sends the robot itself: no --operator and no --ask beside it.";
+  }
   const bool is_sent = a.options.world && a.options.world->world.goal;  // which arms it, too
   if (!a.options.params.supervisor.autostart && !a.keyboard && a.options.asked.empty() && !is_sent) {
     return "Parameter file \"" + a.options.params_file +

@@ -492,6 +492,8 @@ TEST(ClimbCommand, Kind_ThatCannotBe_IsRefused) {
   expect_refused({"climb", "--kind", "escalator"}, "--kind must be up, up-high, ");
   expect_refused({"climb", "--kind", "up", "--world", "w.toml"}, "--world");
   expect_refused({"climb", "--kind", "up", "--steps", "4"}, "--steps is of a staircase, and --kind has none");
+  expect_refused({"climb", "--back"}, "--back needs a world with a goal");
+  expect_refused({"climb", "--kind", "up", "--back", "--ask", "arm@1"}, "--back sends the robot itself");
   expect_refused({"climb", "--kind", "up", "--plant", "kinematic"}, "--kind needs --plant mujoco");
 }
 

@@ -207,6 +207,21 @@ TEST_F(PolygonMapEdges, EndThatALegMakes_IsNoneWhileTheTreadIsSeenToGoOn) {
   EXPECT_NEAR(near_end_m(part), -0.04, 1e-3) << "who says so again and again is right";
 }
 
+TEST_F(PolygonMapEdges, SeenFartherAndFartherBeyondAnEnd_TheEndIsGivenUp) {
+  const Transform camera = looking_down({0, 0, 1});
+  const auto see = [&](double half_x_m, EdgeKind kind) {
+    SurfacePatch patch = level_patch({half_x_m - 0.1, 0, 0}, half_x_m, 0.3);
+    patch.edges.fill(kind);
+    stamp_ns_ += kFrame_ns;
+    fuse(in_camera({patch}, camera, stamp_ns_), camera);
+    return extreme(map_->snapshot().polygons[0], Vec3::UnitX());
+  };
+  for (int i = 0; i < 5; ++i) EXPECT_NEAR(see(0.15, EdgeKind::kObserved), 0.2, 1e-3);
+  double end_m = 0.0;
+  for (int i = 0; i < 12; ++i) end_m = see(0.2 + 0.006 * i, EdgeKind::kUnknown);
+  EXPECT_GT(end_m, 0.35);
+}
+
 // A frame mistook the lip of a tread that is gone down for its nosing, which would make all of it lie before its back.
 TEST_F(PolygonMapEdges, LipThatFacesTheOtherWay_TurnsTheAxes) {
   const Transform camera = looking_down({0, 0, 1});
