@@ -200,11 +200,11 @@ TEST(ControlBits, ClimbOfNoisyInputs_GivesTheRecordedBits) {
   // Estimate, map, footholds, plan and swings all took part.
   EXPECT_GE(pipeline->control().gait_status().treads_climbed, 1U);
   // Recorded anew when a result changes on purpose, and then the same in presets release and orin.
-  EXPECT_EQ(hashes.estimates.value(), 16271003599626058444U);
-  EXPECT_EQ(hashes.gait.value(), 2947607797089606505U);
-  EXPECT_EQ(hashes.commands.value(), 6119465006444569621U);
-  EXPECT_EQ(hashes.surfaces.value(), 15142764443487149569U);
-  EXPECT_EQ(hashes.map.value(), 5187151138975696787U);
+  EXPECT_EQ(hashes.estimates.value(), 10144323502626447275U);
+  EXPECT_EQ(hashes.gait.value(), 11538538321726745745U);
+  EXPECT_EQ(hashes.commands.value(), 10505122840810925701U);
+  EXPECT_EQ(hashes.surfaces.value(), 8165427209321628568U);
+  EXPECT_EQ(hashes.map.value(), 17611560947983038124U);
 }
 
 }  // namespace
