@@ -131,7 +131,8 @@ class FootholdSearch {
             "A surface was seen from this much nearer to the lip than the map tells: an unknown end keeps "
             "`map.sides.unknown_margin_m`.");
       field("seen_inset_m", p.seen_inset_m, 0.0, 0.1,
-            "The heel goes by up to as much farther beyond the lip where the lip hid what is nearer.");
+            "The heel goes by up to as much farther beyond the lip where the lip hid what is nearer. Chosen in the "
+            "simulation.");
     }
   };
   // What may be two steps.

@@ -54,8 +54,8 @@ double FootholdSearch::off_lip_m(const LevelSurface& tread, double along_m, doub
         std::min(limit.clearance_m(tread.at(along_m, left_m)), limit.clearance_m(tread.at(along_m, right_m)));
     return along_m + (kept_m - clearance_m) / limit.inside.inward.dot(tread.heading);
   };
-  // On a wedge the lip is nearer to one of the feet, and to one corner of its heel. On the margin's very edge the next
-  // search would refuse it.
+  // On a wedge the lip is nearer to one of the feet, and to one corner of its heel. The reserve keeps the next search,
+  // whose lip lies a little elsewhere, from refusing the foothold; it was chosen in the simulation (2026-11-30).
   constexpr double kBeyondMargin_m = 0.003;
   double off_m = along_m;
   for (const FootLimit& edge : tread.edges) {

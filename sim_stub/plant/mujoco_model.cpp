@@ -42,14 +42,14 @@ constexpr std::array<std::array<double, 3>, kJointsPerLeg> kLinkHalf_m{{{0.04, 0
                                                                         {0.12, 0.04, 0.015}}};
 
 // Of boxes alone: between two boxes contacts are exact, while those of a cylinder on a tread's edge may push it off
-// with hundreds of newtons (MuJoCo 2.2 goes from middle to middle, and the tread's is half a metre away). Where the toe
+// with hundreds of newtons (as MuJoCo 2.2 does for all but a few pairs of shapes). Where the toe
 // is round, each of its corners is a disc that boxes are inscribed in; where the sole's ends are worn, both are a
 // little higher there.
 void add_sole(Xml& xml, const char* side, const RobotErrors& errors, double ankle_to_sole_m) {
   const SoleRectangle& sole = errors.sole.collision;
   constexpr double kWorn_m = 0.004;
   constexpr double kLeast_m = 1e-3;  // of a box's half width
-  constexpr int kInscribed = 4;  // boxes in a disc: none of them is as much as 2 % of its radius short in its direction
+  constexpr int kInscribed = 4;      // boxes whose corners lie on a disc
   const double round_m = std::min(errors.toe_round_m, sole.half_width_m - kLeast_m), worn_m = errors.sole_edge_m;
   const auto box = [&](double from_x_m, double to_x_m, double half_width_m, double above_m, double y_m = 0.0) {
     xml.add("<geom class='%s' type='box' pos='%.9g %.9g %.9g' size='%.9g %.9g %.9g'/>", side, 0.5 * (from_x_m + to_x_m),

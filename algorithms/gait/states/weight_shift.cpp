@@ -45,7 +45,7 @@ Transition WeightShift::tick(const GaitInput& in, GaitShared& gait) noexcept {
       gait.planner.decide(situation(in, planned.kind == StepKind::kLeading, planned.foot), in.footholds);
   if (!decision.has_step) return wait(params);
   if (close_to_planned(params, decision.goal)) return Transition::swing(decision, search_.plan().tried);
-  // With its heel up the foot goes where it was to: the weight would find the way back to a flat foot too long.
+  // Once its heel is up the foot keeps its goal: a new shift of the weight is planned from a flat foot.
   if (gait.plan.is_on_toe(planned.foot)) return Transition::swing(decision_, search_.plan().tried);
   if (needs_toe_calibration(gait, decision.goal)) return Transition::stand();
   // Over the other foot the weight has its whole way to go.
