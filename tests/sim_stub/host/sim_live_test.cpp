@@ -4,6 +4,7 @@
 #include <poll.h>
 #include <pty.h>
 #include <sys/wait.h>
+#include <termios.h>
 #include <unistd.h>
 
 #include <chrono>
@@ -217,6 +218,11 @@ TEST(LiveProgram, OnATerminal_DrawsInPlaceAndEndsPromptly) {
   const pid_t program = ::forkpty(&terminal, nullptr, nullptr, &size);
   ASSERT_GE(program, 0);
   if (program == 0) {
+    // A terminal throws away what is not read yet when Ctrl-C is pressed: two lines would be read as one.
+    termios modes{};
+    ::tcgetattr(STDIN_FILENO, &modes);
+    modes.c_lflag |= NOFLSH;
+    ::tcsetattr(STDIN_FILENO, TCSANOW, &modes);
     ::setenv("TERM", "xterm", 1);
     ::execl(POLYGMAP_PROGRAM, "polygmap", "climb", "--plant", "kinematic", "--steps", "3", "--watch", "--pace", "1",
             "--out", folder.c_str(), static_cast<char*>(nullptr));
