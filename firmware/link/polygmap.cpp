@@ -197,12 +197,13 @@ int polygmap_operate(polygmap_handle* handle, int command) {
   return instance->operations.try_push(asked) ? POLYGMAP_OK : POLYGMAP_E_FULL;
 }
 
-int polygmap_go_to(polygmap_handle* handle, double ahead_m, double left_m, double turn_rad) {
+int polygmap_go_to(polygmap_handle* handle, double ahead_m, double left_m, double turn_rad, double up_m) {
   if (handle == nullptr) return POLYGMAP_E_NULL;
   Instance* instance = alive(handle);
   if (instance == nullptr) return POLYGMAP_E_INSTANCE;
-  const bool has_turn = !std::isnan(turn_rad);
-  const polygmap::Destination to{ahead_m, left_m, has_turn ? turn_rad : 0.0, has_turn};
+  const bool has_turn = !std::isnan(turn_rad), has_height = !std::isnan(up_m);
+  const polygmap::Destination to{ahead_m,   left_m, has_turn ? turn_rad : 0.0, has_turn, has_height ? up_m : 0.0,
+                                 has_height};
   if (!to.is_valid()) return POLYGMAP_E_PLACE;
   return instance->operations.try_push(polygmap::OperatorRequest(to)) ? POLYGMAP_OK : POLYGMAP_E_FULL;
 }

@@ -60,8 +60,8 @@ class Module {
   [[nodiscard]] int push(const polygmap_depth& picture) noexcept { return polygmap_push_depth(instance_, &picture); }
   [[nodiscard]] int step(std::int64_t now_ns) noexcept { return polygmap_step(instance_, now_ns); }
   [[nodiscard]] int operate(polygmap_operation operation) noexcept { return polygmap_operate(instance_, operation); }
-  [[nodiscard]] int go_to(double ahead_m, double left_m, double turn_rad) noexcept {
-    return polygmap_go_to(instance_, ahead_m, left_m, turn_rad);
+  [[nodiscard]] int go_to(double ahead_m, double left_m, double turn_rad, double up_m) noexcept {
+    return polygmap_go_to(instance_, ahead_m, left_m, turn_rad, up_m);
   }
 
   // Their sizes need not be set.

@@ -40,7 +40,7 @@ class WorldReader {
     file_.world.goal = place(root, "goal");
     group_tops(file_.world);
     if (file_.start.step != kFloorStep) {
-      file_.start_height_m = step_of(file_.start).top_m(file_.start.x_m, file_.start.y_m);
+      file_.start_height_m = file_.world.point_m(file_.start).z();
     }
     check_start(root.get("start")->source().begin.line);
     return file_;
@@ -218,9 +218,10 @@ std::optional<Destination> destination_in(const WorldFile& file) {
   if (!file.world.goal) return std::nullopt;
   const WorldPlace &from = file.start, &to = *file.world.goal;
   const double yaw_rad = from.yaw_rad.value_or(0.0);
-  const Vec3 way_m = rotation_z(yaw_rad).transpose() * Vec3{to.x_m - from.x_m, to.y_m - from.y_m, 0.0};
-  return Destination{way_m.x(), way_m.y(), math::wrap_angle(to.yaw_rad.value_or(yaw_rad) - yaw_rad),
-                     to.yaw_rad.has_value()};
+  const Vec3 way_m = rotation_z(yaw_rad).transpose() * (file.world.point_m(to) - file.world.point_m(from));
+  return Destination{
+      way_m.x(), way_m.y(), math::wrap_angle(to.yaw_rad.value_or(yaw_rad) - yaw_rad), to.yaw_rad.has_value(),
+      way_m.z(), true};
 }
 
 WorldFile parse_world(const std::string& path, std::string_view text) {

@@ -138,6 +138,11 @@ struct StairWorld {
     };
     return group(a) == group(b);
   }
+  [[nodiscard]] Vec3 point_m(const WorldPlace& place) const noexcept {
+    const bool is_floor = place.step < 0;
+    return {place.x_m, place.y_m,
+            is_floor ? 0.0 : steps[static_cast<std::size_t>(place.step)].top_m(place.x_m, place.y_m)};
+  }
   // Of a staircase: height of the highest step at (x, y): 0 beside, before and behind the staircase. Index of its step
   // in *step
   // (-1: floor).

@@ -41,12 +41,15 @@ struct Destination {
   static constexpr double kFarthest_m = 50.0;
   double ahead_m = 0.0;
   double left_m = 0.0;
-  double turn_rad = 0.0;  // to the left, of the heading there against the present one
-  bool has_turn = false;  // false: any heading will do
+  double turn_rad = 0.0;    // to the left, of the heading there against the present one
+  bool has_turn = false;    // false: any heading will do
+  double up_m = 0.0;        // of the ground there above the present one
+  bool has_height = false;  // false: any storey will do
 
   [[nodiscard]] bool is_valid() const noexcept {
     const auto within = [](double x, double most) { return x >= -most && x <= most; };  // false for NaN, too
-    return within(ahead_m, kFarthest_m) && within(left_m, kFarthest_m) && within(turn_rad, 3.2);
+    return within(ahead_m, kFarthest_m) && within(left_m, kFarthest_m) && within(turn_rad, 3.2) &&
+           within(up_m, kFarthest_m);
   }
 };
 

@@ -286,14 +286,16 @@ StopReason ClimbPlanner::reason_against(const Situation& situation, const Footho
 void ClimbPlanner::lay_out_destination(const SolePair& soles) noexcept {
   if (!goal_.asked) return;
   const TorsoPose middle = middle_of(soles);
-  const Vec3 way_m = rotation_z(middle.yaw_rad) * Vec3{goal_.asked->ahead_m, goal_.asked->left_m, 0.0};
-  goal_.laid_out = WalkGoal{(middle.position_m + way_m).head<2>(),
-                            math::wrap_angle(middle.yaw_rad + goal_.asked->turn_rad), goal_.asked->has_turn};
+  const Vec3 way_m = rotation_z(middle.yaw_rad) * Vec3{goal_.asked->ahead_m, goal_.asked->left_m, goal_.asked->up_m};
+  const Vec3 odom_p_m = middle.position_m + way_m;
+  goal_.laid_out = WalkGoal{odom_p_m.head<2>(), math::wrap_angle(middle.yaw_rad + goal_.asked->turn_rad),
+                            goal_.asked->has_turn, odom_p_m.z(), goal_.asked->has_height};
   goal_.asked.reset();
   way_.forget();
 }
 
-// Stairs are the way where the goal lies behind their edge. Until it is known whether more of them come, they still
+// Stairs are the way where they come nearer to the goal's height, or, where that is not known or is theirs, where the
+// goal lies behind their edge. Until it is known whether more of them come, they still
 // are.
 bool ClimbPlanner::leads_to_goal(const Situation& situation, const FootholdSet& footholds) const noexcept {
   if (footholds.map_stamp_ns <= 0 || situation.stamp_ns - footholds.map_stamp_ns > params_.max_map_age_ns) return true;
@@ -307,9 +309,14 @@ bool ClimbPlanner::leads_to_goal(const Situation& situation, const FootholdSet& 
   constexpr double kOnTread_m = 0.40, kReach_m = 0.60;
   const double nosing_ahead_m = heading.dot(nosing_m - middle_of(situation.soles).position_m.head<2>());
   const double goal_ahead_m = heading.dot(way_m);
+  const double z_m = middle_of(situation.soles).position_m.z();
+  const WalkGoal& goal = *goal_.laid_out;
+  const bool is_at_height = goal.has_height && goal.is_at_height(z_m);
   const bool goal_is_here = goal_ahead_m < nosing_ahead_m && way_m.norm() < kReach_m;
-  const bool amid_flight = on_treads_ && nosing_ahead_m < kOnTread_m && !goal_is_here;
-  if (amid_flight || way_.takes_any_stairs()) return true;
+  const bool amid_flight = on_treads_ && nosing_ahead_m < kOnTread_m && !goal_is_here && !is_at_height;
+  if (way_.takes_any_stairs()) return true;
+  if (const auto by_rise = goal.is_by_rise(z_m, footholds.measured_rise_m)) return *by_rise;
+  if (amid_flight) return true;
   return heading.dot(goal_.laid_out->odom_p_m - nosing_m) > params_.walk.stairs_beyond_m &&
          heading.dot(way_m) > math::cos(params_.walk.stairs_aside_rad) * way_m.norm();
 }
@@ -330,7 +337,7 @@ ClimbPlanner::Decision ClimbPlanner::walk(const Situation& situation, const Foot
   decision.walk = step.outcome;
   switch (step.outcome) {
     case LevelStep::Outcome::kArrived:
-      if (!way_.is_on_its_way()) decision.obstruction = StopReason::kAtGoal;
+      if (!way_.is_on_its_way()) decision.obstruction = StopReason::kNoWayUpOrDown;  // has_arrived() says no
       return decision;
     case LevelStep::Outcome::kSteps:
       decision.has_step = true;

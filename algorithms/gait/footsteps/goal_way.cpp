@@ -76,7 +76,11 @@ void GoalWay::seek_vantage(const GoalWayParams& params, const Input& in) noexcep
   if (!stairs || !may_be_told_better(in.footholds.obstruction) || looks_ >= params.most_looks) return;
   const Vec2 heading = unit_at(stairs->yaw_rad);
   const Vec2 way_m = stairs->nosing_m - middle.position_m.head<2>();
-  const bool leads = heading.dot(in.goal.odom_p_m - stairs->nosing_m) > 0.0 && heading.dot(way_m) > 0.0;
+  const bool offers = in.footholds.has_p_star && in.footholds.obstruction == StopReason::kNone;
+  const auto by_rise = in.goal.is_by_rise(middle.position_m.z(), in.footholds.measured_rise_m);
+  const bool is_behind = heading.dot(in.goal.odom_p_m - stairs->nosing_m) > 0.0;
+  // What rises and cannot be climbed from here is a table more often than stairs: it has to lie on the way, too.
+  const bool leads = heading.dot(way_m) > 0.0 && by_rise.value_or(is_behind) && (offers || is_behind);
   // From tread to tread a seen part of the nosing says little of its middle.
   const bool aside = (!(in.climbs && in.on_tread) && std::abs(left_of(heading).dot(way_m)) > params.aside_m) ||
                      std::abs(math::wrap_angle(stairs->yaw_rad - middle.yaw_rad)) > params.aside_rad;
@@ -85,8 +89,7 @@ void GoalWay::seek_vantage(const GoalWayParams& params, const Input& in) noexcep
   const double rise_m = in.footholds.measured_rise_m;
   if (rise_m > kMost_m) return;
   const double back_m = params.look_from_m + kTread_m * std::max(std::ceil(rise_m / kRise_m - 0.1) - 1.0, 0.0);
-  const WalkGoal place{stairs->nosing_m - back_m * heading, stairs->yaw_rad, true};
-  const bool offers = in.footholds.has_p_star && in.footholds.obstruction == StopReason::kNone;
+  const WalkGoal place{.odom_p_m = stairs->nosing_m - back_m * heading, .yaw_rad = stairs->yaw_rad, .has_yaw = true};
   if (!in.climbs && offers) other_stairs_ = place;
   if (!(leads || takes_any_) || !aside) return;
   if (look_from_ && (look_from_->odom_p_m - place.odom_p_m).norm() < params.moved_m) return;
@@ -159,6 +162,8 @@ void GoalWay::walked(const GoalWayParams& params, const Input& in, LevelStep::Ou
     gave_up_for_ = first_refusal_;
   } else if (looks_first()) {
     looked_ = true;  // from as near as it could come
+  } else if (outcome == LevelStep::Outcome::kArrived) {
+    look_round(params, in);
   } else if (outcome == LevelStep::Outcome::kNoGround) {
     bar_unseen(in);
   } else if (outcome == LevelStep::Outcome::kBlocked) {
@@ -168,6 +173,17 @@ void GoalWay::walked(const GoalWayParams& params, const Input& in, LevelStep::Ou
   goes_round_ = false;
   round_ticks_ = 0;
   ticks_ = params.again_ticks;
+}
+
+// It stands below or above the goal, and what it has seen leads nowhere else: stairs may begin behind it.
+void GoalWay::look_round(const GoalWayParams& params, const Input& in) noexcept {
+  if (turns_ >= params.most_turns) return;
+  ++turns_;
+  const TorsoPose middle = middle_of(in.soles);
+  look_from_ = WalkGoal{.odom_p_m = middle.position_m.head<2>(),
+                        .yaw_rad = math::wrap_angle(middle.yaw_rad + 0.5 * kPi),
+                        .has_yaw = true};
+  looked_ = false;
 }
 
 void GoalWay::bar_place(const GoalWayParams& params, const Input& in) noexcept {

@@ -23,6 +23,7 @@ struct GoalWayParams {
   double looked_rad = 0.15;
   double moved_m = 0.12;
   std::int32_t most_looks = 12;
+  std::int32_t most_turns = 3;
   std::int32_t most_steps = 40;  // this and most_refusals: chosen by hand, tried on a few worlds of the simulation
   std::int32_t most_refusals = 6;
   double faces_rad = 0.5;
@@ -41,6 +42,8 @@ struct GoalWayParams {
     field("moved_m", p.moved_m, 0.01, 1.0,
           "The place to look from is another one when the nosing is as far from before.");
     field("most_looks", p.most_looks, 1, 1000, "Between two treads no more places to look from are gone to.");
+    field("most_turns", p.most_turns, 0, 100,
+          "Below or above the goal it turns by 90 degrees so often to look for stairs, before it gives up.");
     field("most_steps", p.most_steps, 0, 10000,
           "It looks for no other way after as many steps without coming nearer to the goal.");
     field("most_refusals", p.most_refusals, 1, 1000,
@@ -96,6 +99,7 @@ class GoalWay {
 
  private:
   void seek_vantage(const GoalWayParams& params, const Input& in) noexcept;
+  void look_round(const GoalWayParams& params, const Input& in) noexcept;
   void bar_unseen(const Input& in) noexcept;
   void bar_place(const GoalWayParams& params, const Input& in) noexcept;
 
@@ -104,6 +108,7 @@ class GoalWay {
   bool takes_any_ = false;
   bool looked_ = false;
   std::int32_t looks_ = 0;
+  std::int32_t turns_ = 0;  // to look for stairs, below or above the goal
   GroundRoute route_;
   GroundRoute::Barred barred_;
   Vec2 barred_corner_m_ = Vec2::Zero();

@@ -78,8 +78,10 @@ LevelWalk::Aim LevelWalk::aim(const TorsoPose& middle, const WalkGoal& goal) con
 }
 
 bool LevelWalk::has_arrived(const SolePair& soles, const WalkGoal& goal) const noexcept {
-  const TorsoPose to = aim(middle_of(soles), goal).pose;
-  return is_there(soles[0], Foot::kLeft, to) && is_there(soles[1], Foot::kRight, to);
+  const TorsoPose middle = middle_of(soles);
+  const TorsoPose to = aim(middle, goal).pose;
+  return goal.is_at_height(middle.position_m.z()) && is_there(soles[0], Foot::kLeft, to) &&
+         is_there(soles[1], Foot::kRight, to);
 }
 
 LevelStep LevelWalk::next(const SolePair& soles, Foot last_swing, bool begins, const WalkGoal& goal,

@@ -2,6 +2,9 @@
 // Steps on level ground to a place, each on ground that was seen and past nothing that rises.
 #pragma once
 
+#include <cmath>
+#include <optional>
+
 #include "algorithms/core/messages/ground_view.hpp"
 #include "algorithms/gait/footsteps/footstep_plan.hpp"
 
@@ -12,6 +15,21 @@ struct WalkGoal {
   Vec2 odom_p_m = Vec2::Zero();  // of the middle between the feet
   double yaw_rad = 0.0;
   bool has_yaw = false;  // false: any heading will do
+  double odom_z_m = 0.0;
+  bool has_height = false;  // false: any storey will do
+
+  // A tread apart are two heights that differ by more. Chosen between the least rise of a tread that is climbed often,
+  // 0.15 m, and what odometry drifts over a flight.
+  static constexpr double kSameHeight_m = 0.09;
+  // It lies on the ground that z_m is the height of, for all that is known.
+  [[nodiscard]] bool is_at_height(double z_m) const noexcept {
+    return !has_height || std::abs(odom_z_m - z_m) < kSameHeight_m;
+  }
+  // From the ground of that height a rise, negative down, comes nearer to its height. None: its height says nothing.
+  [[nodiscard]] std::optional<bool> is_by_rise(double z_m, double rise_m) const noexcept {
+    if (is_at_height(z_m) || rise_m == 0.0) return std::nullopt;
+    return (odom_z_m > z_m) == (rise_m > 0.0);
+  }
 };
 
 struct LevelWalkParams {
@@ -61,7 +79,7 @@ class LevelWalk {
   // last_swing: the foot that stepped last. begins: none has yet, on this walk.
   [[nodiscard]] LevelStep next(const SolePair& soles, Foot last_swing, bool begins, const WalkGoal& goal,
                                const GroundView& ground) const noexcept;
-  // Both feet stand at the goal.
+  // Both feet stand at the goal, at its height.
   [[nodiscard]] bool has_arrived(const SolePair& soles, const WalkGoal& goal) const noexcept;
   // Ground was seen under all of the sole.
   [[nodiscard]] static bool carries(const GroundView& ground, const OrientedRectangle& sole) noexcept;

@@ -109,6 +109,8 @@ void each_field(auto& f, Of<Destination> auto& m) {
   walk(f, "left_m", m.left_m);
   walk(f, "turn_rad", m.turn_rad);
   walk(f, "has_turn", m.has_turn);
+  walk(f, "up_m", m.up_m);
+  walk(f, "has_height", m.has_height);
 }
 void each_field(auto& f, Of<OperatorRequest> auto& m) {
   walk(f, "command", m.command);

@@ -234,12 +234,12 @@ std::vector<std::pair<std::string, std::uint32_t>> raised(const Health& health) 
 }
 
 // As go_to has it: from the middle between the feet.
-Destination destination_from(const Truth& truth, const WorldPlace& to) {
+Destination destination_from(const Truth& truth, const Vec3& to_m) {
   const Transform &left = truth.true_T_sole[0], &right = truth.true_T_sole[1];
   const double yaw_rad = yaw_of(left.R) + 0.5 * math::wrap_angle(yaw_of(right.R) - yaw_of(left.R));
   const Vec3 middle_m = 0.5 * (left.p_m + right.p_m);
-  const Vec3 way_m = rotation_z(yaw_rad).transpose() * Vec3{to.x_m - middle_m.x(), to.y_m - middle_m.y(), 0.0};
-  return {way_m.x(), way_m.y(), 0.0, false};
+  const Vec3 way_m = rotation_z(yaw_rad).transpose() * (to_m - middle_m);
+  return {.ahead_m = way_m.x(), .left_m = way_m.y(), .up_m = way_m.z(), .has_height = true};
 }
 
 }  // namespace
@@ -262,7 +262,7 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
   if (options.comes_back) {
     way_back = [&] {
       sent_to = WorldPlace{options.world->start.x_m, options.world->start.y_m, std::nullopt, options.world->start.step};
-      return destination_from(robot.truth(), *sent_to);
+      return destination_from(robot.truth(), options.world->world.point_m(*sent_to));
     };
   }
   ClimbOperator* const climb_operator = options.climb_operator != nullptr || !goal

@@ -205,8 +205,8 @@ std::string climb_svg(const StairWorld& world, const ClimbDrawing& drawing, cons
   }
   if (file != nullptr) {
     constexpr double kLabel_m = 0.3;  // above the ground
-    include_point(point_of(file->start, world));
-    if (file->world.goal) include_point(point_of(*file->world.goal, world) + kLabel_m * Vec3::UnitZ());
+    include_point(world.point_m(file->start));
+    if (file->world.goal) include_point(world.point_m(*file->world.goal) + kLabel_m * Vec3::UnitZ());
   }
   // What is farther from the robot's way than this is no part of the picture.
   constexpr double kAround_m = 2.0;

@@ -249,12 +249,13 @@ TEST(Link, SentToAPlace_WalksThereAndEnds) {
   EXPECT_EQ(polygmap_operate(linked.module(), POLYGMAP_OPERATE_ARM), POLYGMAP_OK);
   for (int i = 0; i < kUntilItStands_ticks; ++i) linked.tick();
   const double nan = std::nan("");
-  EXPECT_EQ(polygmap_go_to(nullptr, 0.0, 0.0, nan), POLYGMAP_E_NULL);
-  EXPECT_EQ(polygmap_go_to(linked.module(), 51.0, 0.0, nan), POLYGMAP_E_PLACE);
-  EXPECT_EQ(polygmap_go_to(linked.module(), nan, 0.0, 0.0), POLYGMAP_E_PLACE);
-  EXPECT_EQ(polygmap_go_to(linked.module(), 1.0, 0.0, 3.3), POLYGMAP_E_PLACE);
+  EXPECT_EQ(polygmap_go_to(nullptr, 0.0, 0.0, nan, nan), POLYGMAP_E_NULL);
+  EXPECT_EQ(polygmap_go_to(linked.module(), 51.0, 0.0, nan, nan), POLYGMAP_E_PLACE);
+  EXPECT_EQ(polygmap_go_to(linked.module(), nan, 0.0, 0.0, nan), POLYGMAP_E_PLACE);
+  EXPECT_EQ(polygmap_go_to(linked.module(), 1.0, 0.0, 3.3, nan), POLYGMAP_E_PLACE);
+  EXPECT_EQ(polygmap_go_to(linked.module(), 1.0, 0.0, nan, -50.1), POLYGMAP_E_PLACE);
   EXPECT_EQ(polygmap_operate(linked.module(), POLYGMAP_OPERATE_GO_TO), POLYGMAP_E_OPERATE) << "it names no place";
-  EXPECT_EQ(polygmap_go_to(linked.module(), -0.02, 0.0, nan), POLYGMAP_OK);
+  EXPECT_EQ(polygmap_go_to(linked.module(), -0.02, 0.0, nan, nan), POLYGMAP_OK);
   for (int i = 0; i < 3000 && linked.status().state != POLYGMAP_STATE_ON_TOP; ++i) linked.tick();
   EXPECT_EQ(linked.status().answer.operation, POLYGMAP_OPERATE_GO_TO);
   EXPECT_EQ(linked.status().state, POLYGMAP_STATE_ON_TOP);

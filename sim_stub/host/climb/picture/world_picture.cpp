@@ -111,16 +111,10 @@ void add_solids(std::string& out, const View& view, const StairWorld& world) {
   }
 }
 
-Vec3 point_of(const WorldPlace& place, const StairWorld& world) {
-  const double top_m =
-      place.step < 0 ? 0.0 : world.steps[static_cast<std::size_t>(place.step)].top_m(place.x_m, place.y_m);
-  return {place.x_m, place.y_m, top_m};
-}
-
 void add_places(std::string& out, const View& view, const WorldFile& file) {
   constexpr const char* kColour = "#b5179e";
   const auto mark = [&](const WorldPlace& place, double radius_m, const char* text) {
-    const Vec3 p_m = point_of(place, file.world);
+    const Vec3 p_m = file.world.point_m(place);
     const double x_px = view.x_px(p_m), y_px = view.y_px(p_m), reach_px = radius_m * view.scale_pxpm;
     if (view.up == 1) {
       add(out, "<circle cx=\"%.1f\" cy=\"%.1f\" r=\"%.1f\" fill=\"none\" stroke=\"%s\" stroke-dasharray=\"3 3\"/>\n",

@@ -17,8 +17,6 @@ void add_stairs_from_above(std::string& out, const View& view, const StairWorld&
 void add_step_numbers(std::string& out, const View& view, const StairWorld& world, bool from_the_side);
 // Of a world file: each as its outline, the nearest last; what is not to be stood on shows what is behind it.
 void add_solids(std::string& out, const View& view, const StairWorld& world);
-// On the top that the place is on.
-[[nodiscard]] Vec3 point_of(const WorldPlace& place, const StairWorld& world);
 // Where the robot starts and is to go.
 void add_places(std::string& out, const View& view, const WorldFile& file);
 
