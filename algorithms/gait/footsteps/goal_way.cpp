@@ -129,10 +129,13 @@ void GoalWay::watch(const GoalWayParams& params, const Input& in) noexcept {
   is_known_ = true;
   const Vec2 way_m = to_m - middle.position_m.head<2>();
   faces_ = std::abs(math::wrap_angle(math::atan2(way_m.y(), way_m.x()) - middle.yaw_rad)) < params.faces_rad;
-  if (route_.way() != GroundRoute::Way::kRound || steps_ >= params.most_steps || gave_up_for_) {
+  const bool faces_again = goes_round_ && !in.goal.is_at_height(middle.position_m.z()) &&
+                           (middle.position_m.head<2>() - faced_from_m_).norm() > params.face_again_m;
+  if (faces_again || route_.way() != GroundRoute::Way::kRound || steps_ >= params.most_steps || gave_up_for_) {
     goes_round_ = false;
     round_ticks_ = 0;
-  } else if (faces_ && ++round_ticks_ >= params.sure_ticks) {
+  } else if ((faces_ && ++round_ticks_ >= params.sure_ticks) || refusals_ > 0) {  // it may be unable to turn to it
+    if (!goes_round_) faced_from_m_ = middle.position_m.head<2>();
     goes_round_ = true;
   }
 }

@@ -28,6 +28,7 @@ struct GoalWayParams {
   std::int32_t most_refusals = 6;
   double faces_rad = 0.5;
   double tried_m = 0.35;
+  double face_again_m = 0.8;
   std::int32_t sure_ticks = 200;
   std::int32_t again_ticks = 100;
   GroundRouteParams route;
@@ -51,6 +52,10 @@ struct GoalWayParams {
     field("faces_rad", p.faces_rad, 0.05, 3.2, "It turns to what is in the way, within this, before it goes round.");
     field("tried_m", p.tried_m, 0.1, 1.0,
           "Where it stood before a thing and came no further, no way leads through so much about its place.");
+    field("face_again_m", p.face_again_m, 0.1, 10.0,
+          "Going round below or above the goal it turns to what is in the way again after as far: stairs may begin "
+          "there. "
+          "Chosen by hand for landings.");
     field(
         "sure_ticks", p.sure_ticks, 0, 10000,
         "It looks so long at what is in the way before it goes round, and at ground before it believes there is none.");
@@ -114,7 +119,8 @@ class GoalWay {
   Vec2 barred_corner_m_ = Vec2::Zero();
   bool is_known_ = false;  // the way, since the last step
   bool goes_round_ = false;
-  bool faces_ = false;  // the place that it would go to straight on
+  bool faces_ = false;                // the place that it would go to straight on
+  Vec2 faced_from_m_ = Vec2::Zero();  // where it began to go round
   std::int32_t round_ticks_ = 0, refused_ticks_ = 0, ticks_ = 0, steps_ = 0;
   double nearest_m_ = std::numeric_limits<double>::infinity();  // to the goal, since the last tread
   std::int32_t refusals_ = 0;                                   // since the last step

@@ -11,7 +11,7 @@ namespace polygmap {
 
 struct GroundRouteParams {
   double thing_m = 0.36;
-  double brink_m = 0.22;
+  double brink_m = 0.28;
   double ahead_m = 0.80;
   double reached_m = 0.25;
   std::int32_t waves_per_tick = 2;

@@ -87,38 +87,58 @@ bool LevelWalk::has_arrived(const SolePair& soles, const WalkGoal& goal) const n
 LevelStep LevelWalk::next(const SolePair& soles, Foot last_swing, bool begins, const WalkGoal& goal,
                           const GroundView& ground) const noexcept {
   const TorsoPose middle = middle_of(soles);
-  const auto [to, turns_first] = aim(middle, goal);
-  const auto is_there = [&, &at = to](Foot foot) { return this->is_there(soles[index_of(foot)], foot, at); };
+  const Aim to = aim(middle, goal);
+  const auto is_there = [&](Foot foot) { return this->is_there(soles[index_of(foot)], foot, to.pose); };
   LevelStep step;
   // Of before the last step, from another level.
   if (!(std::abs(ground.height_m - middle.position_m.z()) < params_.level_m)) return step;
-  const double now_m = clearance_m(ground, middle.position_m.head<2>(), params_.body_m);
   if (is_there(Foot::kLeft) && is_there(Foot::kRight)) {
     step.outcome = LevelStep::Outcome::kArrived;
     return step;
   }
   step.foot = other(last_swing);
-  if (begins) step.foot = swing_foot(displacement(middle, to), step.foot, rule_);
+  if (begins) step.foot = swing_foot(displacement(middle, to.pose), step.foot, rule_);
   if (is_there(step.foot)) step.foot = other(step.foot);
+  if (try_steps(soles, to, ground, step)) return step;
+  // Beside an edge the foot away from it steps farther away first.
+  LevelStep of_other;
+  of_other.foot = other(step.foot);
+  if (is_there(of_other.foot) || !try_steps(soles, to, ground, of_other)) return step;
+  const SolePose& now = soles[index_of(of_other.foot)];
+  const bool moves = (of_other.target.position_m - now.position_m).head<2>().norm() > params_.within_m ||
+                     std::abs(math::wrap_angle(of_other.target.yaw_rad - now.yaw_rad)) > params_.within_rad;
+  return moves ? of_other : step;
+}
+
+bool LevelWalk::try_steps(const SolePair& soles, const Aim& to, const GroundView& ground,
+                          LevelStep& step) const noexcept {
+  const TorsoPose middle = middle_of(soles);
+  const double now_m = clearance_m(ground, middle.position_m.head<2>(), params_.body_m);
   // A shorter step may still be on what was seen; and from an edge or a wall it goes a step away before it turns.
   constexpr std::array kShares{1.0, 0.5, 0.25};
-  constexpr std::array kAway_m{0.0, 0.1, 0.2, -0.1};
+  struct Away {
+    double ahead_m, left_m;
+  };
+  constexpr std::array kAway{Away{0.0, 0.0},  Away{0.1, 0.0}, Away{0.2, 0.0},
+                             Away{-0.1, 0.0}, Away{0.0, 0.1}, Away{0.0, -0.1}};
   for (const double share : kShares) {
-    if (try_step(soles, to, shortened(limits_, share), ground, now_m, step)) return step;
+    if (try_step(soles, to.pose, shortened(limits_, share), ground, now_m, step)) return true;
   }
-  const double turn_rad = math::wrap_angle(to.yaw_rad - middle.yaw_rad);
-  if (!turns_first && std::abs(turn_rad) < params_.within_rad) return step;
+  const double turn_rad = math::wrap_angle(to.pose.yaw_rad - middle.yaw_rad);
+  if (!to.turns_first && std::abs(turn_rad) < params_.within_rad) return false;
   const LevelStep refused = step;
   for (const double turn_share : {1.0, 0.0}) {
-    if (turn_share == 0.0 && !turns_first) break;
-    for (const double away_m : kAway_m) {
+    if (turn_share == 0.0 && !to.turns_first) break;
+    for (const Away& away : kAway) {
       TorsoPose aside = middle;
-      aside.position_m.head<2>() += away_m * unit_at(middle.yaw_rad);
+      const Vec2 heading = unit_at(middle.yaw_rad);
+      aside.position_m.head<2>() += away.ahead_m * heading + away.left_m * left_of(heading);
       aside.yaw_rad += turn_share * turn_rad;
-      if (try_step(soles, aside, limits_, ground, now_m, step)) return step;
+      if (try_step(soles, aside, limits_, ground, now_m, step)) return true;
     }
   }
-  return refused;
+  step = refused;
+  return false;
 }
 
 bool LevelWalk::try_step(const SolePair& soles, const TorsoPose& to, const FloorStepLimits& limits,

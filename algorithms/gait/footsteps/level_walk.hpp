@@ -93,7 +93,10 @@ class LevelWalk {
     bool turns_first;
   };
   [[nodiscard]] Aim aim(const TorsoPose& middle, const WalkGoal& goal) const noexcept;
-  // Of step.foot; false: its outcome says why not. now_m: clearance of the body as it stands.
+  // Of step.foot, shorter or aside where it must be; false: its outcome says why not.
+  [[nodiscard]] bool try_steps(const SolePair& soles, const Aim& to, const GroundView& ground,
+                               LevelStep& step) const noexcept;
+  // The same of one place. now_m: clearance of the body as it stands.
   [[nodiscard]] bool try_step(const SolePair& soles, const TorsoPose& to, const FloorStepLimits& limits,
                               const GroundView& ground, double now_m, LevelStep& step) const noexcept;
 
