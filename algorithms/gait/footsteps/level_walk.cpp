@@ -84,7 +84,7 @@ bool LevelWalk::has_arrived(const SolePair& soles, const WalkGoal& goal) const n
          is_there(soles[1], Foot::kRight, to);
 }
 
-LevelStep LevelWalk::next(const SolePair& soles, Foot last_swing, bool begins, const WalkGoal& goal,
+LevelStep LevelWalk::next(const SolePair& soles, const LastSwing& last, const WalkGoal& goal,
                           const GroundView& ground) const noexcept {
   const TorsoPose middle = middle_of(soles);
   const Aim to = aim(middle, goal);
@@ -96,11 +96,13 @@ LevelStep LevelWalk::next(const SolePair& soles, Foot last_swing, bool begins, c
     step.outcome = LevelStep::Outcome::kArrived;
     return step;
   }
-  step.foot = other(last_swing);
-  if (begins) step.foot = swing_foot(displacement(middle, to.pose), step.foot, rule_);
+  step.foot = other(last.foot);
+  if (last.begins) step.foot = swing_foot(displacement(middle, to.pose), step.foot, rule_);
   if (is_there(step.foot)) step.foot = other(step.foot);
   if (try_steps(soles, to, ground, step)) return step;
-  // Beside an edge the foot away from it steps farther away first.
+  // Beside an edge the foot away from it steps farther away first, and then the other one has to follow: eight steps of
+  // one foot, to and fro, ended in a fall.
+  if (last.again && !last.begins) return step;
   LevelStep of_other;
   of_other.foot = other(step.foot);
   if (is_there(of_other.foot) || !try_steps(soles, to, ground, of_other)) return step;

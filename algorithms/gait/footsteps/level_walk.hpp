@@ -71,13 +71,17 @@ struct LevelStep {
 
 class LevelWalk {
  public:
+  struct LastSwing {
+    Foot foot = Foot::kRight;
+    bool again = false;   // the same foot stepped before that
+    bool begins = false;  // that was before this walk
+  };
   // sole, half_width_m: of the robot. limits: of a step.
   LevelWalk(const LevelWalkParams& params, const SoleModel& sole, double half_width_m, const FloorStepLimits& limits,
             const SwingRule& rule) noexcept
       : params_(params), sole_(sole), half_width_m_(half_width_m), limits_(limits), rule_(rule) {}
 
-  // last_swing: the foot that stepped last. begins: none has yet, on this walk.
-  [[nodiscard]] LevelStep next(const SolePair& soles, Foot last_swing, bool begins, const WalkGoal& goal,
+  [[nodiscard]] LevelStep next(const SolePair& soles, const LastSwing& last, const WalkGoal& goal,
                                const GroundView& ground) const noexcept;
   // Both feet stand at the goal, at its height.
   [[nodiscard]] bool has_arrived(const SolePair& soles, const WalkGoal& goal) const noexcept;

@@ -207,5 +207,28 @@ TEST(ClimbPlanner, GoalOnTheTreadItStandsOn_WalksThere) {
   EXPECT_EQ(decision.goal.kind, StepKind::kFloor);
 }
 
+TEST(ClimbPlanner, FlightGoesOnPastTheGoalsStorey_WalksToTheGoal) {
+  OnATread on;
+  on.planner.go_to({.ahead_m = 0.0, .left_m = -2.0, .up_m = 0.0, .has_height = true});
+  on.planner.lay_out_destination(on.situation.soles);
+  FootholdSet up = next_tread(on);
+  up.measured_rise_m = 0.13;
+  const ClimbPlanner::Decision decision = on.planner.look_and_decide(on.situation, up);
+  ASSERT_TRUE(decision.has_step);
+  EXPECT_TRUE(decision.walks);
+}
+
+// As where the flight above a landing turns back over the one below.
+TEST(ClimbPlanner, StairsLeadUpToAGoalAboveAndBehind_ClimbsThemAndNoneDown) {
+  OnATread on;
+  on.planner.go_to({.ahead_m = -3.0, .up_m = 1.0, .has_height = true});
+  on.planner.lay_out_destination(on.situation.soles);
+  FootholdSet next = next_tread(on);
+  next.measured_rise_m = 0.13;
+  EXPECT_EQ(on.planner.look_and_decide(on.situation, next).goal.kind, StepKind::kLeading);
+  next.measured_rise_m = -0.13;
+  EXPECT_TRUE(on.planner.look_and_decide(on.situation, next).walks);
+}
+
 }  // namespace
 }  // namespace polygmap

@@ -121,6 +121,64 @@ TEST_F(GoalWayTest, StairsSeenSquarely_OrNotToTheGoal_NeedNoLook) {
   EXPECT_FALSE(way_.looks_first());
 }
 
+TEST_F(GoalWayTest, StairsUpToAGoalAbove_AreLookedAtWhereverItLies) {
+  footholds_.has_p_star = true;
+  see_stairs(0.1, 0.9, 0.5, StopReason::kNone);
+  footholds_.measured_rise_m = 0.13;
+  goal_ = {.odom_p_m = {0.5, -1.0}, .odom_z_m = 2.0, .has_height = true};
+  watch(1);
+  EXPECT_TRUE(way_.looks_first());
+  way_.forget();
+  goal_.odom_z_m = -2.0;
+  watch(1);
+  EXPECT_FALSE(way_.looks_first()) << "they lead up, and the goal is below";
+  footholds_.measured_rise_m = -0.13;
+  watch(1);
+  EXPECT_TRUE(way_.looks_first());
+}
+
+TEST_F(GoalWayTest, ArrivedBelowTheGoal_LooksRoundAndThenGivesNoWay) {
+  goal_ = {.odom_p_m = {0.0, 0.0}, .odom_z_m = 2.0, .has_height = true};
+  double yaw_rad = 0.0;
+  for (int i = 0; i < params_.most_turns; ++i) {
+    walked(params_.sure_ticks, LevelStep::Outcome::kArrived);
+    ASSERT_TRUE(way_.looks_first()) << i;
+    yaw_rad = math::wrap_angle(yaw_rad + 0.5 * kPi);
+    EXPECT_NEAR(way_.next(goal_)->yaw_rad, yaw_rad, 1e-9);
+    soles_ = stand_at({0.0, 0.0}, yaw_rad);
+    watch(1);
+    EXPECT_FALSE(way_.looks_first()) << i;
+  }
+  walked(params_.sure_ticks, LevelStep::Outcome::kArrived);
+  EXPECT_FALSE(way_.looks_first());
+}
+
+// As beside the open side of the flight below: where it cannot turn to what is in the way it has looked all it can.
+TEST_F(GoalWayTest, RefusedWithoutFacingTheGoal_GoesRoundAtOnce) {
+  goal_.odom_p_m = {-2.0, 0.0};
+  for (std::size_t y = 26; y < 36; ++y) footholds_.ground.tall[y] = std::uint64_t{0xF} << 14U;
+  watch(2 * params_.sure_ticks);
+  EXPECT_FALSE(way_.is_on_its_way());
+  walked(params_.sure_ticks, LevelStep::Outcome::kNoGround);
+  watch(30);
+  EXPECT_TRUE(way_.is_on_its_way());
+}
+
+TEST_F(GoalWayTest, GoesRoundBelowTheGoal_FacesWhatIsInTheWayAgainFartherOn) {
+  goal_ = {.odom_p_m = {2.0, 0.0}, .odom_z_m = 2.0, .has_height = true};
+  for (std::size_t y = 0; y < 48; ++y) footholds_.ground.tall[y] = std::uint64_t{0xF} << 46U;
+  watch(2 * params_.sure_ticks);
+  ASSERT_TRUE(way_.is_on_its_way());
+  const auto go_on = [&](double left_m) {
+    soles_ = stand_at({0.0, left_m}, 0.5 * kPi);
+    way_.stepped();
+    watch(30);
+    return way_.is_on_its_way();
+  };
+  EXPECT_TRUE(go_on(params_.face_again_m - 0.1));
+  EXPECT_FALSE(go_on(params_.face_again_m + 0.1));
+}
+
 TEST_F(GoalWayTest, CannotComeToWhereItWouldLook_JudgesFromWhereItIs) {
   see_stairs(0.1, 0.9, 0.5, StopReason::kTooNarrow);
   walked(params_.sure_ticks, LevelStep::Outcome::kNoGround);

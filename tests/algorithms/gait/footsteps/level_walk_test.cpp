@@ -18,8 +18,7 @@ class LevelWalkTest : public ::testing::Test {
   const LevelWalk walk_{params_, robot_.sole, robot_.stance.half_width_m, {}, {}};
   SolePair soles_ = stand_at({0.0, 0.0}, 0.0);
   GroundView ground_ = everywhere();
-  Foot last_ = Foot::kRight;
-  bool begins_ = true;
+  LevelWalk::LastSwing last_{Foot::kRight, false, true};
 
   [[nodiscard]] SolePair stand_at(const Vec2& p_m, double yaw_rad) const {
     const TorsoPose torso{{p_m.x(), p_m.y(), 0.0}, yaw_rad};
@@ -44,11 +43,10 @@ class LevelWalkTest : public ::testing::Test {
     }
   }
   [[nodiscard]] LevelStep next(const WalkGoal& goal) {
-    const LevelStep step = walk_.next(soles_, last_, begins_, goal, ground_);
+    const LevelStep step = walk_.next(soles_, last_, goal, ground_);
     if (step.outcome != Outcome::kSteps) return step;
     soles_[index_of(step.foot)] = step.target;
-    last_ = step.foot;
-    begins_ = false;
+    last_ = {step.foot, !last_.begins && step.foot == last_.foot, false};
     return step;
   }
   // Steps until none is left to do; the last outcome.
@@ -65,7 +63,7 @@ class LevelWalkTest : public ::testing::Test {
 TEST_F(LevelWalkTest, GoalAllAround_StandsThereWithBothFeetAndItsHeading) {
   for (int i = 0; i < 12; ++i) {
     soles_ = stand_at({0.0, 0.0}, 0.3);
-    begins_ = true;
+    last_.begins = true;
     const double bearing_rad = i * kPi / 6.0;
     const WalkGoal goal{0.9 * unit_at(bearing_rad), math::wrap_angle(2.0 - bearing_rad), true};
     EXPECT_EQ(walk_to(goal, 80).outcome, Outcome::kArrived) << bearing_rad;
@@ -113,6 +111,37 @@ TEST_F(LevelWalkTest, EdgeBehindTheHeels_GoesAStepAheadBeforeItTurns) {
   set(ground_.level, false, [](const Vec2& p_m) { return p_m.x() < -0.10; });
   const WalkGoal goal{{0.3, 1.0}, 0.0, false};
   EXPECT_EQ(walk_to(goal, 80).outcome, Outcome::kArrived);
+}
+
+// The right foot has no place beside the edge for its next step, the left one has.
+TEST_F(LevelWalkTest, EdgeBesideTheRightFoot_StepsWithTheLeftOneAndGoesOn) {
+  const double edge_m = soles_[1].position_m.y() - robot_.sole.contact.half_width_m - 0.01;
+  soles_[0].position_m.y() -= 0.06;  // as near as a step may end beside it
+  set(ground_.level, false, [&](const Vec2& p_m) { return p_m.y() < edge_m; });
+  last_ = {Foot::kLeft, false, false};
+  const WalkGoal goal{{0.8, 0.3}, 0.0, false};
+  const LevelStep first = next(goal);
+  EXPECT_EQ(first.outcome, Outcome::kSteps);
+  EXPECT_EQ(first.foot, Foot::kLeft);
+  EXPECT_EQ(next(goal).foot, Foot::kRight) << "not the left one a third time";
+  EXPECT_EQ(walk_to(goal, 40).outcome, Outcome::kArrived);
+}
+
+TEST_F(LevelWalkTest, EdgesOnBothSides_RepeatsNoStepInPlace) {
+  set(ground_.level, false, [&](const Vec2& p_m) { return std::abs(p_m.y()) > 0.16; });
+  EXPECT_NE(walk_to({{0.0, 2.0}, 0.0, false}, 40).outcome, Outcome::kSteps);
+}
+
+TEST_F(LevelWalkTest, GoalOnAnotherStorey_IsNotArrivedAt) {
+  WalkGoal goal{.odom_z_m = 0.05, .has_height = true};
+  EXPECT_TRUE(walk_.has_arrived(soles_, goal));
+  goal.odom_z_m = 0.15;
+  EXPECT_FALSE(walk_.has_arrived(soles_, goal));
+  EXPECT_EQ(goal.is_by_rise(0.0, 0.15), std::optional(true));
+  EXPECT_EQ(goal.is_by_rise(0.0, -0.15), std::optional(false));
+  EXPECT_EQ(goal.is_by_rise(0.15, -0.15), std::nullopt);
+  goal.has_height = false;
+  EXPECT_TRUE(walk_.has_arrived(soles_, goal));
 }
 
 TEST_F(LevelWalkTest, GroundNeverSeen_TakesNoStep) {
