@@ -333,7 +333,7 @@ ClimbPlanner::Decision ClimbPlanner::walk(const Situation& situation, const Foot
   const std::optional<WalkGoal> to = way_.next(*goal_.laid_out);
   if (!to) return decision;
   const LevelStep step =
-      walk.next(situation.soles, {memory_.last_swing, memory_.swung_again, !walking_ && floor_.steps == 0}, *to,
+      walk.next(situation.soles, {memory_.last_swing, memory_.swings_in_a_row, !walking_ && floor_.steps == 0}, *to,
                 footholds.ground);
   decision.walk = step.outcome;
   switch (step.outcome) {
@@ -424,7 +424,7 @@ ClimbPlanner::Decision ClimbPlanner::decide(const Situation& situation, const Fo
 void ClimbPlanner::latched(const Situation& situation, const Decision& decision) noexcept {
   latched_ = decision;
   before_latch_ = memory_;
-  memory_.swung_again = decision.goal.foot == memory_.last_swing;
+  memory_.swings_in_a_row = decision.goal.foot == memory_.last_swing ? memory_.swings_in_a_row + 1 : 1;
   memory_.last_swing = decision.goal.foot;
   const Vec3 travel_m = decision.goal.target.position_m - situation.soles[index_of(memory_.last_swing)].position_m;
   walking_ = decision.walks;

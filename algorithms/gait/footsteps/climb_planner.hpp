@@ -249,7 +249,7 @@ class ClimbPlanner {
     Foothold trailing_foothold;           // from the leading latch
     Vec3 odom_trailing_m = Vec3::Zero();  // from the leading foot's target to it
     Foot last_swing = Foot::kRight;
-    bool swung_again = false;  // twice in a row
+    std::int32_t swings_in_a_row = 1;  // of that foot
     Foot leading = Foot::kLeft;
     bool has_leading = false;
   } memory_, before_latch_;

@@ -100,8 +100,10 @@ void GoalWay::seek_vantage(const GoalWayParams& params, const Input& in) noexcep
 }
 
 void GoalWay::watch(const GoalWayParams& params, const Input& in) noexcept {
-  Vec2 corner_m = barred_corner_m_;
-  move_to(in.footholds.ground.corner_m, barred_.unseen, corner_m);
+  for (GroundView::Rows* rows : {&barred_.unseen, &barred_.walked}) {
+    Vec2 corner_m = barred_corner_m_;
+    move_to(in.footholds.ground.corner_m, *rows, corner_m);
+  }
   move_to(in.footholds.ground.corner_m, barred_.tried, barred_corner_m_);
   if (!(in.climbs && in.lines_up)) seek_vantage(params, in);
   if (in.climbs && !looks_first()) {
@@ -117,12 +119,14 @@ void GoalWay::watch(const GoalWayParams& params, const Input& in) noexcept {
     steps_ = shut_places_ = 0;
     first_refusal_.reset();
     gave_up_for_.reset();
+    barred_.walked = {};
   }
   const Vec2 to_m = looks_first() ? look_from_->odom_p_m : in.goal.odom_p_m;
   if (route_.is_busy()) {
     route_.step(params.route);
   } else if (!is_known_ || ++ticks_ >= params.again_ticks) {
     ticks_ = 0;
+    if (goes_round_) mark_place(in, params.tried_m, barred_.walked);
     route_.begin(params.route, in.footholds.ground, barred_, middle.position_m.head<2>(), to_m);
   }
   if (route_.is_busy()) return;
@@ -170,7 +174,7 @@ void GoalWay::walked(const GoalWayParams& params, const Input& in, LevelStep::Ou
   } else if (outcome == LevelStep::Outcome::kNoGround) {
     bar_unseen(in);
   } else if (outcome == LevelStep::Outcome::kBlocked) {
-    bar_place(params, in);
+    mark_place(in, params.tried_m, barred_.tried);
   }
   route_.clear();
   goes_round_ = false;
@@ -189,15 +193,15 @@ void GoalWay::look_round(const GoalWayParams& params, const Input& in) noexcept 
   looked_ = false;
 }
 
-void GoalWay::bar_place(const GoalWayParams& params, const Input& in) noexcept {
+void GoalWay::mark_place(const Input& in, double within_m, GroundView::Rows& rows) noexcept {
   const Vec2 at_m = middle_of(in.soles).position_m.head<2>() - in.footholds.ground.corner_m;
-  const std::int32_t last_y = std::min(GroundView::cell_of(at_m.y() + params.tried_m), GroundView::kSide_cells - 1);
-  for (std::int32_t y = std::max(GroundView::cell_of(at_m.y() - params.tried_m), 0); y <= last_y; ++y) {
+  const std::int32_t last_y = std::min(GroundView::cell_of(at_m.y() + within_m), GroundView::kSide_cells - 1);
+  for (std::int32_t y = std::max(GroundView::cell_of(at_m.y() - within_m), 0); y <= last_y; ++y) {
     const double off_m = (y + 0.5) * GroundView::kCell_m - at_m.y();
-    const double half_m = math::sqrt(std::max(math::square(params.tried_m) - math::square(off_m), 0.0));
+    const double half_m = math::sqrt(std::max(math::square(within_m) - math::square(off_m), 0.0));
     constexpr double kHalf_m = 0.5 * GroundView::kCell_m;  // of a square: its middle counts
-    barred_.tried[static_cast<std::size_t>(y)] |= GroundView::bits_of(GroundView::cell_of(at_m.x() - half_m + kHalf_m),
-                                                                      GroundView::cell_of(at_m.x() + half_m - kHalf_m));
+    rows[static_cast<std::size_t>(y)] |= GroundView::bits_of(GroundView::cell_of(at_m.x() - half_m + kHalf_m),
+                                                             GroundView::cell_of(at_m.x() + half_m - kHalf_m));
   }
 }
 

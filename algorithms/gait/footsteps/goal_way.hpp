@@ -106,7 +106,7 @@ class GoalWay {
   void seek_vantage(const GoalWayParams& params, const Input& in) noexcept;
   void look_round(const GoalWayParams& params, const Input& in) noexcept;
   void bar_unseen(const Input& in) noexcept;
-  void bar_place(const GoalWayParams& params, const Input& in) noexcept;
+  static void mark_place(const Input& in, double within_m, GroundView::Rows& rows) noexcept;
 
   std::optional<WalkGoal> look_from_;
   std::optional<WalkGoal> other_stairs_;  // from where stairs were to be looked at that do not seem to lead to the goal

@@ -83,7 +83,7 @@ void GroundRoute::begin(const GroundRouteParams& params, const GroundView& groun
     way_ = Way::kUnknown;
     return;
   }
-  for (std::size_t y = 0; y < dear_.size(); ++y) dear_[y] = ~ground.level[y];
+  for (std::size_t y = 0; y < dear_.size(); ++y) dear_[y] = ~ground.level[y] | barred.walked[y];
   Rows tall = ground.tall;
   keep_within(tall, start_.x, start_.y, squares_of(params.ahead_m));
   shut_ = tall;

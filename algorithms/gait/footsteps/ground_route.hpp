@@ -34,6 +34,7 @@ class GroundRoute {
   struct Barred {
     GroundView::Rows unseen{};  // it looked there and saw no level ground
     GroundView::Rows tried{};   // it stood there and came no further
+    GroundView::Rows walked{};  // it was there on its way round: a way back there counts double
   };
 
   // from, to: odometry, as the view's corner. Step until it is no longer busy; the way found before holds until then,

@@ -102,7 +102,8 @@ LevelStep LevelWalk::next(const SolePair& soles, const LastSwing& last, const Wa
   if (try_steps(soles, to, ground, step)) return step;
   // Beside an edge the foot away from it steps farther away first, and then the other one has to follow: eight steps of
   // one foot, to and fro, ended in a fall.
-  if (last.again && !last.begins) return step;
+  constexpr std::int32_t kMost = 3;
+  if (last.in_a_row >= kMost && !last.begins) return step;
   LevelStep of_other;
   of_other.foot = other(step.foot);
   if (is_there(of_other.foot) || !try_steps(soles, to, ground, of_other)) return step;

@@ -73,8 +73,8 @@ class LevelWalk {
  public:
   struct LastSwing {
     Foot foot = Foot::kRight;
-    bool again = false;   // the same foot stepped before that
-    bool begins = false;  // that was before this walk
+    std::int32_t in_a_row = 1;  // steps of that foot
+    bool begins = false;        // that was before this walk
   };
   // sole, half_width_m: of the robot. limits: of a step.
   LevelWalk(const LevelWalkParams& params, const SoleModel& sole, double half_width_m, const FloorStepLimits& limits,

@@ -101,6 +101,19 @@ TEST_F(GroundRouteTest, WhereItStoodAndCameNoFurther_GoesElsewhere) {
   EXPECT_EQ(find({0, 0}, {1.2, 0.0}), Way::kRound);
 }
 
+// Between two ways as long it would turn to and fro for ever.
+TEST_F(GroundRouteTest, OneOfTwoWaysWalkedAlready_TakesTheOther) {
+  const auto box = [](const Vec2& p_m) { return p_m.x() > 0.4 && p_m.x() < 0.7 && std::abs(p_m.y()) < 0.4; };
+  set(ground_.tall, true, box);
+  for (const double side : {1.0, -1.0}) {
+    barred_.walked = {};
+    set(barred_.walked, true, [&](const Vec2& p_m) { return side * p_m.y() > 0.2; });
+    route_.clear();
+    ASSERT_EQ(find({0, 0}, {1.2, 0.0}), Way::kRound);
+    EXPECT_LT(side * route_.via_m().y(), 0.0);
+  }
+}
+
 TEST_F(GroundRouteTest, WallsAllAround_ThereIsNoWay) {
   set(ground_.tall, true,
       [](const Vec2& p_m) { return p_m.cwiseAbs().maxCoeff() > 0.6 && p_m.cwiseAbs().maxCoeff() < 0.7; });

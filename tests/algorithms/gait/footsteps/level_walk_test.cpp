@@ -18,7 +18,7 @@ class LevelWalkTest : public ::testing::Test {
   const LevelWalk walk_{params_, robot_.sole, robot_.stance.half_width_m, {}, {}};
   SolePair soles_ = stand_at({0.0, 0.0}, 0.0);
   GroundView ground_ = everywhere();
-  LevelWalk::LastSwing last_{Foot::kRight, false, true};
+  LevelWalk::LastSwing last_{Foot::kRight, 1, true};
 
   [[nodiscard]] SolePair stand_at(const Vec2& p_m, double yaw_rad) const {
     const TorsoPose torso{{p_m.x(), p_m.y(), 0.0}, yaw_rad};
@@ -46,7 +46,7 @@ class LevelWalkTest : public ::testing::Test {
     const LevelStep step = walk_.next(soles_, last_, goal, ground_);
     if (step.outcome != Outcome::kSteps) return step;
     soles_[index_of(step.foot)] = step.target;
-    last_ = {step.foot, !last_.begins && step.foot == last_.foot, false};
+    last_ = {step.foot, step.foot == last_.foot ? last_.in_a_row + 1 : 1, false};
     return step;
   }
   // Steps until none is left to do; the last outcome.
@@ -118,13 +118,20 @@ TEST_F(LevelWalkTest, EdgeBesideTheRightFoot_StepsWithTheLeftOneAndGoesOn) {
   const double edge_m = soles_[1].position_m.y() - robot_.sole.contact.half_width_m - 0.01;
   soles_[0].position_m.y() -= 0.06;  // as near as a step may end beside it
   set(ground_.level, false, [&](const Vec2& p_m) { return p_m.y() < edge_m; });
-  last_ = {Foot::kLeft, false, false};
+  last_ = {Foot::kLeft, 1, false};
   const WalkGoal goal{{0.8, 0.3}, 0.0, false};
   const LevelStep first = next(goal);
   EXPECT_EQ(first.outcome, Outcome::kSteps);
   EXPECT_EQ(first.foot, Foot::kLeft);
-  EXPECT_EQ(next(goal).foot, Foot::kRight) << "not the left one a third time";
   EXPECT_EQ(walk_to(goal, 40).outcome, Outcome::kArrived);
+}
+
+TEST_F(LevelWalkTest, EdgeBesideTheRightFoot_StepsNotForEverWithTheLeftOne) {
+  const double edge_m = soles_[1].position_m.y() - robot_.sole.contact.half_width_m - 0.01;
+  set(ground_.level, false, [&](const Vec2& p_m) { return p_m.y() < edge_m; });
+  soles_[0].position_m.y() -= 0.06;
+  last_ = {Foot::kLeft, 3, false};
+  EXPECT_EQ(next({{0.8, 0.3}, 0.0, false}).outcome, Outcome::kNoGround);
 }
 
 TEST_F(LevelWalkTest, EdgesOnBothSides_RepeatsNoStepInPlace) {
