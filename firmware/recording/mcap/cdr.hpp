@@ -50,7 +50,7 @@ class CdrWriter {
   recording::ByteWriter out_;
 };
 
-// Fails as ByteReader does: then values are zero and failed() is true from there on.
+// Reads what CdrWriter wrote. Fails as ByteReader does: then values are zero and failed() is true from there on.
 class CdrReader {
  public:
   explicit CdrReader(std::span<const std::byte> message) noexcept
@@ -61,13 +61,13 @@ class CdrReader {
   }
   template <recording::Number T>
   [[nodiscard]] T get() noexcept {
-    while (in_.place() % sizeof(T) != 0 && !in_.failed()) (void)in_.get<std::uint8_t>();
+    while (in_.place() % sizeof(T) != 0 && !in_.failed()) take_zero();
     return in_.get<T>();
   }
   [[nodiscard]] std::string_view get_text() noexcept {
     const auto length = get<std::uint32_t>();
     const std::string_view text = in_.get_text(length);
-    if (length == 0) in_.fail();
+    if (length == 0 || (!text.empty() && text.back() != '\0')) in_.fail();
     return text.substr(0, text.empty() ? 0 : text.size() - 1);
   }
   // A count of elements of at least so many bytes each: no larger than what is left holds.
@@ -83,6 +83,10 @@ class CdrReader {
   [[nodiscard]] bool failed() const noexcept { return in_.failed(); }
 
  private:
+  // The writer fills with zeros: a bit flipped there is told of as anywhere else.
+  void take_zero() noexcept {
+    if (in_.get<std::uint8_t>() != 0) in_.fail();
+  }
   std::size_t size_;
   recording::ByteReader in_;
 };

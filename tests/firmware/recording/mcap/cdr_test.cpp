@@ -108,6 +108,11 @@ TEST(CdrReader, BytesThatAreNone_Fail) {
   EXPECT_TRUE(fails({0, 0, 0, 0}, nothing)) << "big-endian";
   EXPECT_FALSE(fails({0, 1, 0, 0}, nothing));
   const auto text = [](CdrReader& in) { (void)in.get_text(); };
+  EXPECT_FALSE(fails({0, 1, 0, 0, 2, 0, 0, 0, 'a', 0}, text));
+  EXPECT_TRUE(fails({0, 1, 0, 0, 2, 0, 0, 0, 'a', 'b'}, text)) << "a text without its end";
+  const auto filled = [](CdrReader& in) { (void)in.get<std::uint8_t>(), (void)in.get<std::uint16_t>(); };
+  EXPECT_FALSE(fails({0, 1, 0, 0, 7, 0, 7, 0}, filled));
+  EXPECT_TRUE(fails({0, 1, 0, 0, 7, 1, 7, 0}, filled));
   EXPECT_TRUE(fails({0, 1, 0, 0, 0, 0, 0, 0}, text)) << "not even its end";
   EXPECT_TRUE(fails({0, 1, 0, 0, 9, 0, 0, 0, 65, 0}, text)) << "longer than the message";
   EXPECT_TRUE(fails({0, 1, 0, 0, 255, 255, 255, 255, 65, 0}, text));
