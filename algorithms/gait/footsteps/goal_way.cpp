@@ -67,13 +67,13 @@ void GoalWay::stepped() noexcept {
 
 void GoalWay::seek_vantage(const GoalWayParams& params, const Input& in) noexcept {
   const TorsoPose middle = middle_of(in.soles);
-  if (look_from_) {
-    const Vec2 off_m = look_from_->odom_p_m - middle.position_m.head<2>();
-    looked_ = looked_ || (off_m.norm() < params.looked_m &&
-                          std::abs(math::wrap_angle(look_from_->yaw_rad - middle.yaw_rad)) < params.looked_rad);
+  if (look_.from) {
+    const Vec2 off_m = look_.from->odom_p_m - middle.position_m.head<2>();
+    look_.done = look_.done || (off_m.norm() < params.looked_m &&
+                                std::abs(math::wrap_angle(look_.from->yaw_rad - middle.yaw_rad)) < params.looked_rad);
   }
   const std::optional<Stairs> stairs = stairs_in(in.footholds);
-  if (!stairs || !may_be_told_better(in.footholds.obstruction) || looks_ >= params.most_looks) return;
+  if (!stairs || !may_be_told_better(in.footholds.obstruction) || look_.count >= params.most_looks) return;
   const Vec2 heading = unit_at(stairs->yaw_rad);
   const Vec2 way_m = stairs->nosing_m - middle.position_m.head<2>();
   const bool offers = in.footholds.has_p_star && in.footholds.obstruction == StopReason::kNone;
@@ -92,10 +92,10 @@ void GoalWay::seek_vantage(const GoalWayParams& params, const Input& in) noexcep
   const WalkGoal place{.odom_p_m = stairs->nosing_m - back_m * heading, .yaw_rad = stairs->yaw_rad, .has_yaw = true};
   if (!in.climbs && offers) other_stairs_ = place;
   if (!(leads || takes_any_) || !aside) return;
-  if (look_from_ && (look_from_->odom_p_m - place.odom_p_m).norm() < params.moved_m) return;
-  look_from_ = place;
-  looked_ = false;
-  ++looks_;
+  if (look_.from && (look_.from->odom_p_m - place.odom_p_m).norm() < params.moved_m) return;
+  look_.from = place;
+  look_.done = false;
+  ++look_.count;
   route_.clear();
 }
 
@@ -121,7 +121,7 @@ void GoalWay::watch(const GoalWayParams& params, const Input& in) noexcept {
     gave_up_for_.reset();
     barred_.walked = {};
   }
-  const Vec2 to_m = looks_first() ? look_from_->odom_p_m : in.goal.odom_p_m;
+  const Vec2 to_m = looks_first() ? look_.from->odom_p_m : in.goal.odom_p_m;
   if (route_.is_busy()) {
     route_.step(params.route);
   } else if (!is_known_ || ++ticks_ >= params.again_ticks) {
@@ -150,7 +150,7 @@ void GoalWay::walked(const GoalWayParams& params, const Input& in, LevelStep::Ou
     refused_ticks_ = 0;
     return;
   }
-  if (looks_first() && outcome == LevelStep::Outcome::kArrived) looked_ = true;
+  if (looks_first() && outcome == LevelStep::Outcome::kArrived) look_.done = true;
   if (++refused_ticks_ < params.sure_ticks || gave_up_for_) return;
   refused_ticks_ = 0;
   const bool shut = outcome != LevelStep::Outcome::kArrived;
@@ -162,13 +162,13 @@ void GoalWay::walked(const GoalWayParams& params, const Input& in, LevelStep::Ou
     steps_ = shut_places_ = 0;  // the way to them may lead away from the goal
     nearest_m_ = std::numeric_limits<double>::infinity();
     takes_any_ = true;
-    look_from_ = other_stairs_;
-    looked_ = false;
+    look_.from = other_stairs_;
+    look_.done = false;
     barred_ = {};
   } else if (searched) {
     gave_up_for_ = first_refusal_;
   } else if (looks_first()) {
-    looked_ = true;  // from as near as it could come
+    look_.done = true;  // from as near as it could come
   } else if (outcome == LevelStep::Outcome::kArrived) {
     look_round(params, in);
   } else if (outcome == LevelStep::Outcome::kNoGround) {
@@ -184,13 +184,13 @@ void GoalWay::walked(const GoalWayParams& params, const Input& in, LevelStep::Ou
 
 // It stands below or above the goal, and what it has seen leads nowhere else: stairs may begin behind it.
 void GoalWay::look_round(const GoalWayParams& params, const Input& in) noexcept {
-  if (turns_ >= params.most_turns) return;
-  ++turns_;
+  if (look_.turns >= params.most_turns) return;
+  ++look_.turns;
   const TorsoPose middle = middle_of(in.soles);
-  look_from_ = WalkGoal{.odom_p_m = middle.position_m.head<2>(),
+  look_.from = WalkGoal{.odom_p_m = middle.position_m.head<2>(),
                         .yaw_rad = math::wrap_angle(middle.yaw_rad + 0.5 * kPi),
                         .has_yaw = true};
-  looked_ = false;
+  look_.done = false;
 }
 
 void GoalWay::mark_place(const Input& in, double within_m, GroundView::Rows& rows) noexcept {
@@ -233,7 +233,7 @@ std::optional<WalkGoal> GoalWay::next(const WalkGoal& goal) const noexcept {
   if (goes_round_) return WalkGoal{route_.via_m(), 0.0, false};
   // What is in the way it first turns to, and looks at for a while.
   if (faces_ && round_ticks_ > 0) return std::nullopt;
-  return looks_first() ? *look_from_ : goal;
+  return looks_first() ? *look_.from : goal;
 }
 
 }  // namespace polygmap

@@ -90,7 +90,7 @@ class GoalWay {
   void walked(const GoalWayParams& params, const Input& in, LevelStep::Outcome outcome,
               const Refusal& refusal) noexcept;
 
-  [[nodiscard]] bool looks_first() const noexcept { return look_from_ && !looked_; }
+  [[nodiscard]] bool looks_first() const noexcept { return look_.from && !look_.done; }
   // No other way is left than up stairs that it saw, though they do not seem to lead to the goal: as where they turn
   // back on a landing.
   [[nodiscard]] bool takes_any_stairs() const noexcept { return takes_any_; }
@@ -108,12 +108,14 @@ class GoalWay {
   void bar_unseen(const Input& in) noexcept;
   static void mark_place(const Input& in, double within_m, GroundView::Rows& rows) noexcept;
 
-  std::optional<WalkGoal> look_from_;
+  struct {
+    std::optional<WalkGoal> from;
+    bool done = false;
+    std::int32_t count = 0;
+    std::int32_t turns = 0;  // to look for stairs, below or above the goal
+  } look_;
   std::optional<WalkGoal> other_stairs_;  // from where stairs were to be looked at that do not seem to lead to the goal
   bool takes_any_ = false;
-  bool looked_ = false;
-  std::int32_t looks_ = 0;
-  std::int32_t turns_ = 0;  // to look for stairs, below or above the goal
   GroundRoute route_;
   GroundRoute::Barred barred_;
   Vec2 barred_corner_m_ = Vec2::Zero();
