@@ -167,6 +167,44 @@ bool GroundMap::tell(GroundView& out) noexcept {
   return true;
 }
 
+void GroundMap::leave_out(const Transform& map_T_local, const ConvexPolygon& local, GroundView& out) noexcept {
+  const auto corner = [&](std::size_t i) -> Vec2 {
+    const Vec2& p_m = local[i % local.size()];
+    return (map_T_local * Vec3{p_m.x(), p_m.y(), 0.0}).head<2>() - out.corner_m;
+  };
+  constexpr double kFar_m = 1e3;
+  std::array<double, GroundView::kSide_cells> first_m{}, last_m{};  // of a row's middle line
+  first_m.fill(kFar_m);
+  last_m.fill(-kFar_m);
+  work_.add(2 * GroundView::kSide_cells, 30);
+  for (std::size_t i = 0; i < local.size(); ++i) {
+    const Vec2 a_m = corner(i), b_m = corner(i + 1);
+    const double low_m = std::min(a_m.y(), b_m.y()), high_m = std::max(a_m.y(), b_m.y());
+    const std::int32_t last = std::min(GroundView::cell_of(high_m), GroundView::kSide_cells - 1);
+    work_.add(100);
+    for (std::int32_t y = std::max(GroundView::cell_of(low_m), 0); y <= last; ++y) {
+      const double at_m = middle_of_cell_m(y);
+      if (at_m < low_m || at_m > high_m || !(high_m > low_m)) continue;
+      const double x_m = a_m.x() + (b_m.x() - a_m.x()) * (at_m - a_m.y()) / (b_m.y() - a_m.y());
+      const auto row = static_cast<std::size_t>(y);
+      first_m[row] = std::min(first_m[row], x_m);
+      last_m[row] = std::max(last_m[row], x_m);
+      work_.add(20);
+    }
+  }
+  constexpr std::int32_t kAbout = 2;  // squares: it begins before what was seen of it
+  for (std::int32_t y = 0; y < GroundView::kSide_cells; ++y) {
+    const auto from = static_cast<std::size_t>(y);
+    if (first_m[from] > last_m[from]) continue;
+    const std::uint64_t bits =
+        GroundView::bits_of(GroundView::cell_of(first_m[from]) - kAbout, GroundView::cell_of(last_m[from]) + kAbout);
+    const std::int32_t last = std::min(y + kAbout, GroundView::kSide_cells - 1);
+    for (std::int32_t row = std::max(y - kAbout, 0); row <= last; ++row) {
+      out.level[static_cast<std::size_t>(row)] &= ~bits;
+    }
+  }
+}
+
 void GroundMap::set(GroundView::Rows& rows, std::int32_t x, std::int32_t y) const noexcept {
   const std::int32_t column = x - first_x_, row = y - first_y_;
   if (column < 0 || row < 0 || column >= GroundView::kSide_cells || row >= GroundView::kSide_cells) return;

@@ -10,6 +10,7 @@
 #include "algorithms/core/messages/ground_view.hpp"
 #include "algorithms/core/messages/samples.hpp"
 #include "algorithms/core/work.hpp"
+#include "algorithms/geometry/convex.hpp"
 #include "algorithms/geometry/plan_frame.hpp"
 #include "algorithms/perception/image/column_image.hpp"
 #include "algorithms/robot/robot_model.hpp"
@@ -60,6 +61,8 @@ class GroundMap {
   void begin(const View& view) noexcept;
   [[nodiscard]] bool look() noexcept;
   [[nodiscard]] bool tell(GroundView& out) noexcept;
+  // What lies within the outline, x and y of its own frame, is not level.
+  void leave_out(const Transform& map_T_local, const ConvexPolygon& local, GroundView& out) noexcept;
   [[nodiscard]] WorkCount& work() noexcept { return work_; }  // since it was last paid
 
  private:

@@ -180,7 +180,16 @@ void PolygonMap::do_piece() noexcept {
       if (ground_.look()) stage_ = view_.tell_ground ? Stage::kTellGround : Stage::kPublish;
       break;
     case Stage::kTellGround:
-      if (ground_.tell(snapshot_.ground)) stage_ = Stage::kPublish;
+      if (!ground_.tell(snapshot_.ground)) break;
+      pass_.track = 0;
+      stage_ = Stage::kSlopes;
+      break;
+    case Stage::kSlopes:
+      if (pass_.track == tracks_.size()) {
+        stage_ = Stage::kPublish;
+      } else if (const MapTrack& track = tracks_[pass_.track++]; slopes(track)) {
+        ground_.leave_out(track.map_T_local, track.polygon, snapshot_.ground);
+      }
       break;
     case Stage::kPublish:
       publish();
@@ -203,6 +212,13 @@ void PolygonMap::begin_ground() noexcept {
   for (Transform& sole : view.map_T_sole) sole.p_m -= view_.odom_T_camera.p_m - map_T_camera_.p_m;
   ground_.begin(view);
   stage_ = Stage::kGround;
+}
+
+// What is steeper than a ramp is none that anybody would stand on.
+bool PolygonMap::slopes(const MapTrack& track) const noexcept {
+  const double up = track.map_T_local.R.col(2).z();
+  constexpr double kSteepest = 0.7;
+  return !track.erased && track.sightings > 1 && up > kSteepest && up < math::cos(params_.level_rad);
 }
 
 bool PolygonMap::load(const SurfacePatch& patch) noexcept {

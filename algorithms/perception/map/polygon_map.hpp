@@ -160,6 +160,7 @@ class PolygonMap {
     double least_tilt_sigma_rad = 0.0005;
     double max_range_m = 10.0;
     double turn_slope = 0.05;
+    double level_rad = 0.039;
     double rmse_gain = 0.1;
     KindParams kinds;
     LineParams lines;
@@ -185,6 +186,10 @@ class PolygonMap {
       field("max_range_m", p.max_range_m, 0.5, 100.0, "A surface that reaches farther from the camera is rejected.");
       field("turn_slope", p.turn_slope, 0.0, 1.0,
             "A tread's axes turn to its nosing, or its back line, where that has a larger slope in them.");
+      field(
+          "level_rad", p.level_rad, 0.0, 0.5,
+          "A surface that slopes by more is no ground to walk on: feet are put down level. Above what a mount that is "
+          "not yet known makes of a floor, by the camera's data sheet; tried on ramps of the simulation alone.");
       field("rmse_gain", p.rmse_gain, 0.0, 1.0,
             "Share of the newest sighting in what is remembered of the fit's residual.");
       field("kinds", p.kinds);
@@ -255,6 +260,7 @@ class PolygonMap {
     kThingsAgain,
     kGround,
     kTellGround,
+    kSlopes,
     kPublish
   };
   [[nodiscard]] Stage stage() const noexcept { return stage_; }
@@ -287,6 +293,7 @@ class PolygonMap {
   void do_piece() noexcept;
   void begin_things() noexcept;
   void begin_ground() noexcept;
+  [[nodiscard]] bool slopes(const MapTrack& track) const noexcept;
   void order_surfaces() noexcept;
   void begin_fusing() noexcept;
   void next_surface() noexcept;

@@ -65,6 +65,26 @@ TEST_F(GroundMapTest, LevelFloor_IsLevelWhereItWasSeenAndNowhereElse) {
   for (const std::uint64_t row : told_.tall) EXPECT_EQ(row, 0U);
 }
 
+TEST_F(GroundMapTest, RampSeenAmidTheFloor_IsLeftOutWithTwoSquaresAboutIt) {
+  look([](double, double) { return 0.0; }, 40);
+  const Transform ramp{rotation_z(0.5), Vec3{0.6, 0.0, 0.0}};
+  ConvexPolygon outline;
+  for (const auto& [x, y] : {std::pair{-0.2, -0.1}, {0.2, -0.1}, {0.2, 0.1}, {-0.2, 0.1}})
+    static_cast<void>(outline.try_push_back({x, y}));
+  map_->leave_out(ramp, outline, told_);
+  for (const double x_m : {-0.24, -0.1, 0.0, 0.1, 0.24}) {
+    const Vec3 p_m = ramp * Vec3{x_m, 0.0, 0.0};
+    EXPECT_FALSE(is(told_.level, p_m.x(), p_m.y())) << x_m;
+  }
+  for (const double y_m : {-0.24, 0.24}) {
+    const Vec3 p_m = ramp * Vec3{0.0, y_m, 0.0};
+    EXPECT_TRUE(is(told_.level, p_m.x(), p_m.y())) << y_m;
+  }
+  const GroundView before = told_;
+  map_->leave_out({Mat3::Identity(), Vec3{9.0, 9.0, 0.0}}, outline, told_);
+  EXPECT_EQ(told_.level, before.level) << "out of the view";
+}
+
 // A polygon around it would be convex.
 TEST_F(GroundMapTest, HoleInTheFloor_IsNoGround) {
   const auto in_hole = [](double x, double y) { return x > 0.6 && x < 0.9 && std::abs(y) < 0.15; };
