@@ -185,11 +185,7 @@ void PolygonMap::do_piece() noexcept {
       stage_ = Stage::kSlopes;
       break;
     case Stage::kSlopes:
-      if (pass_.track == tracks_.size()) {
-        stage_ = Stage::kPublish;
-      } else if (const MapTrack& track = tracks_[pass_.track++]; slopes(track)) {
-        ground_.leave_out(track.map_T_local, track.polygon, snapshot_.ground);
-      }
+      leave_out_slope();
       break;
     case Stage::kPublish:
       publish();
@@ -214,11 +210,22 @@ void PolygonMap::begin_ground() noexcept {
   stage_ = Stage::kGround;
 }
 
-// What is steeper than a ramp is none that anybody would stand on.
-bool PolygonMap::slopes(const MapTrack& track) const noexcept {
-  const double up = track.map_T_local.R.col(2).z();
+// The next one, if there is any. What is steeper than a ramp is none that anybody would stand on.
+void PolygonMap::leave_out_slope() noexcept {
   constexpr double kSteepest = 0.7;
-  return !track.erased && track.sightings > 1 && up > kSteepest && up < math::cos(params_.level_rad);
+  const double level = math::cos(params_.level_rad);
+  const auto from = tracks_.begin() + static_cast<std::ptrdiff_t>(pass_.track);
+  const auto next = std::find_if(from, tracks_.end(), [&](const MapTrack& track) {
+    const double up = track.map_T_local.R(2, 2);
+    return up > kSteepest && up < level && track.sightings > 1 && !track.erased;
+  });
+  work_.add(static_cast<std::size_t>(next - from), 10);
+  if (next == tracks_.end()) {
+    stage_ = Stage::kPublish;
+    return;
+  }
+  ground_.leave_out(next->map_T_local, next->polygon, snapshot_.ground);
+  pass_.track = static_cast<std::size_t>(next - tracks_.begin()) + 1;
 }
 
 bool PolygonMap::load(const SurfacePatch& patch) noexcept {
