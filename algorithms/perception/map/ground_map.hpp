@@ -62,7 +62,8 @@ class GroundMap {
   [[nodiscard]] bool look() noexcept;
   [[nodiscard]] bool tell(GroundView& out) noexcept;
   // What lies within the outline, x and y of its own frame, is not level.
-  void leave_out(const Transform& map_T_local, const ConvexPolygon& local, GroundView& out) noexcept;
+  [[gnu::cold, gnu::noinline]] void leave_out(const Transform& map_T_local, const ConvexPolygon& local,
+                                              GroundView& out) noexcept;
   [[nodiscard]] WorkCount& work() noexcept { return work_; }  // since it was last paid
 
  private:

@@ -293,7 +293,7 @@ class PolygonMap {
   void do_piece() noexcept;
   void begin_things() noexcept;
   void begin_ground() noexcept;
-  void leave_out_slope() noexcept;
+  [[gnu::cold, gnu::noinline]] void leave_out_slope() noexcept;
   void order_surfaces() noexcept;
   void begin_fusing() noexcept;
   void next_surface() noexcept;
