@@ -43,9 +43,9 @@ extern "C" {
 #endif
 
 #define POLYGMAP_VERSION_MAJOR 0
-#define POLYGMAP_VERSION_MINOR 1
+#define POLYGMAP_VERSION_MINOR 2
 #define POLYGMAP_VERSION_PATCH 0
-#define POLYGMAP_VERSION_TEXT "0.1.0"
+#define POLYGMAP_VERSION_TEXT "0.2.0"
 // For comparisons: POLYGMAP_VERSION_NUMBER >= 10200 is 1.2.0 or newer.
 #define POLYGMAP_VERSION_NUMBER (POLYGMAP_VERSION_MAJOR * 10000 + POLYGMAP_VERSION_MINOR * 100 + POLYGMAP_VERSION_PATCH)
 
@@ -202,7 +202,8 @@ int polygmap_operate(polygmap* instance, int command);
 // The same, and answered likewise: to walk and climb to a place and end there, from where it stands when its next step
 // hears of it: ahead and to the left of the middle between the feet, m, 50 at most. turn_rad: how the heading there is
 // turned to the left against the present one, from -3.2 to 3.2; not a number: any heading will do. up_m: how much
-// higher the ground there lies than here, 50 at most, negative down; not a number: any storey will do.
+// higher the ground there lies than that under the lower foot, to 0.09 m, 50 at most, negative down; not a number: any
+// storey will do.
 int polygmap_go_to(polygmap* instance, double ahead_m, double left_m, double turn_rad, double up_m);
 
 // ---------------------------------------------------------------------------------------------------------------------

@@ -61,6 +61,15 @@ TEST(WorldClimb, SentBackFromItsGoal_TurnsAndGoesDownTheSameStairs) {
   EXPECT_GT(s.sole_margin_min_m, 0.004);
 }
 
+TEST(WorldClimb, GoalBehindAPlatform_GoesUpAndDownAgain) {
+  const ClimbSummary s = climb(kOnTheFloor + solid("up", 0.0, 0.3, 0.13) + solid("top", 0.3, 1.1, 0.26) +
+                                   solid("down", 1.1, 1.4, 0.13) + "[goal]\nx = 2.4\ny = 0\nsurface = \"floor\"\n",
+                               1);
+  EXPECT_TRUE(s.pass) << s.reason;
+  EXPECT_EQ(s.route.surfaces_stood_on, (std::vector<std::string>{"floor", "up", "top", "down", "floor"}));
+  EXPECT_GT(s.sole_margin_min_m, 0.004);
+}
+
 // The page lays the lidar's own world on the true one: its way lies where the base's does.
 TEST(WorldClimb, Recorded_ReportHasTheSolidsAndTheLidarsWay) {
   const std::string path = testing::TempDir() + "/polygmap_world_" + std::to_string(::getpid()) + ".mcap";

@@ -18,8 +18,9 @@ struct GroundView {
 
   Vec2 corner_m = Vec2::Zero();  // where x and y of cell (0, 0) begin
   double height_m = 0.0;         // of the standing soles, as they stood for it
-  Rows level{};                  // ground at the height of the standing soles was seen there, or a sole has stood there
-  Rows tall{};                   // something rises there
+  // Ground at the height of the standing soles was seen there, or a sole has stood there, and no mapped slope is near.
+  Rows level{};
+  Rows tall{};  // something rises there
 
   [[nodiscard]] static std::int32_t cell_of(double along_m) noexcept {
     return static_cast<std::int32_t>(std::floor(along_m / kCell_m));

@@ -287,16 +287,18 @@ void ClimbPlanner::lay_out_destination(const SolePair& soles) noexcept {
   if (!goal_.asked) return;
   const TorsoPose middle = middle_of(soles);
   const Vec3 way_m = rotation_z(middle.yaw_rad) * Vec3{goal_.asked->ahead_m, goal_.asked->left_m, goal_.asked->up_m};
-  const Vec3 odom_p_m = middle.position_m + way_m;
-  goal_.laid_out = WalkGoal{odom_p_m.head<2>(), math::wrap_angle(middle.yaw_rad + goal_.asked->turn_rad),
-                            goal_.asked->has_turn, odom_p_m.z(), goal_.asked->has_height};
+  const double ground_m = std::min(soles[0].position_m.z(), soles[1].position_m.z());  // one may be in the air
+  goal_.laid_out =
+      WalkGoal{(middle.position_m + way_m).head<2>(), math::wrap_angle(middle.yaw_rad + goal_.asked->turn_rad),
+               goal_.asked->has_turn, ground_m + way_m.z(), goal_.asked->has_height};
   goal_.asked.reset();
+  walking_ = false;
+  memory_.swings_in_a_row = 1;
   way_.forget();
 }
 
-// Stairs are the way where they come nearer to the goal's height, or, where that is not known or is theirs, where the
-// goal lies behind their edge. Until it is known whether more of them come, they still
-// are.
+// Stairs are the way where they come nearer to the goal's height, or, where that is not known or is this one, where the
+// goal lies behind their edge. Until it is known whether more of them come, they still are.
 bool ClimbPlanner::leads_to_goal(const Situation& situation, const FootholdSet& footholds) const noexcept {
   if (footholds.map_stamp_ns <= 0 || situation.stamp_ns - footholds.map_stamp_ns > params_.max_map_age_ns) return true;
   const bool offers = footholds.has_p_star || footholds.obstruction == StopReason::kEdgeUncertain;
@@ -305,18 +307,18 @@ bool ClimbPlanner::leads_to_goal(const Situation& situation, const FootholdSet& 
   const Vec2 heading = unit_at(footholds.p_star_feet[0].yaw_rad);
   const Vec2 nosing_m = 0.5 * (footholds.tread.nosing_a_m + footholds.tread.nosing_b_m).head<2>();
   const Vec2 way_m = goal_.laid_out->odom_p_m - middle_of(situation.soles).position_m.head<2>();
-  // Amid a flight there is no other way than on: the landing behind it may lead back, or aside.
+  // Amid a flight there is no other way than on: the landing behind it may lead back, aside, or over a rise to where it
+  // came from. Not past the goal's height, and not back.
   constexpr double kOnTread_m = 0.40, kReach_m = 0.60;
   const double nosing_ahead_m = heading.dot(nosing_m - middle_of(situation.soles).position_m.head<2>());
   const double goal_ahead_m = heading.dot(way_m);
   const double z_m = middle_of(situation.soles).position_m.z();
   const WalkGoal& goal = *goal_.laid_out;
-  const bool is_at_height = goal.has_height && goal.is_at_height(z_m);
+  const bool goes_on = (footholds.measured_rise_m < 0.0) == memory_.led_down && !goal.is_at_height(z_m);
   const bool goal_is_here = goal_ahead_m < nosing_ahead_m && way_m.norm() < kReach_m;
-  const bool amid_flight = on_treads_ && nosing_ahead_m < kOnTread_m && !goal_is_here && !is_at_height;
-  if (way_.takes_any_stairs()) return true;
+  const bool amid_flight = on_treads_ && nosing_ahead_m < kOnTread_m && !goal_is_here && (!goal.has_height || goes_on);
+  if (amid_flight || way_.takes_any_stairs()) return true;
   if (const auto by_rise = goal.is_by_rise(z_m, footholds.measured_rise_m)) return *by_rise;
-  if (amid_flight) return true;
   return heading.dot(goal_.laid_out->odom_p_m - nosing_m) > params_.walk.stairs_beyond_m &&
          heading.dot(way_m) > math::cos(params_.walk.stairs_aside_rad) * way_m.norm();
 }
@@ -438,6 +440,7 @@ void ClimbPlanner::latched(const Situation& situation, const Decision& decision)
   if (leads(decision.goal.kind)) {
     memory_.leading = decision.goal.foot;
     memory_.has_leading = true;
+    memory_.led_down = decision.rise_m < 0.0;
     memory_.trailing_foothold = decision.trailing.foothold;
     memory_.odom_trailing_m = decision.trailing.foothold.position_m - decision.goal.target.position_m;
   }

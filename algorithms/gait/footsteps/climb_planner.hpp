@@ -252,6 +252,7 @@ class ClimbPlanner {
     std::int32_t swings_in_a_row = 1;  // of that foot
     Foot leading = Foot::kLeft;
     bool has_leading = false;
+    bool led_down = false;  // the step that led last
   } memory_, before_latch_;
   struct {
     std::optional<Destination> asked;

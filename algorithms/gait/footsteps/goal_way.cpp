@@ -90,7 +90,7 @@ void GoalWay::seek_vantage(const GoalWayParams& params, const Input& in) noexcep
   if (rise_m > kMost_m) return;
   const double back_m = params.look_from_m + kTread_m * std::max(std::ceil(rise_m / kRise_m - 0.1) - 1.0, 0.0);
   const WalkGoal place{.odom_p_m = stairs->nosing_m - back_m * heading, .yaw_rad = stairs->yaw_rad, .has_yaw = true};
-  if (!in.climbs && offers) other_stairs_ = place;
+  if (!in.climbs && offers && by_rise.value_or(true)) other_stairs_ = place;
   if (!(leads || takes_any_) || !aside) return;
   if (look_.from && (look_.from->odom_p_m - place.odom_p_m).norm() < params.moved_m) return;
   look_.from = place;
@@ -138,7 +138,8 @@ void GoalWay::watch(const GoalWayParams& params, const Input& in) noexcept {
   if (faces_again || route_.way() != GroundRoute::Way::kRound || steps_ >= params.most_steps || gave_up_for_) {
     goes_round_ = false;
     round_ticks_ = 0;
-  } else if ((faces_ && ++round_ticks_ >= params.sure_ticks) || refusals_ > 0) {  // it may be unable to turn to it
+  } else if ((faces_ && ++round_ticks_ >= params.sure_ticks) || refusals_ > 0) {
+    // Where it was refused it has looked as long, and may be unable to turn: beside an edge.
     if (!goes_round_) faced_from_m_ = middle.position_m.head<2>();
     goes_round_ = true;
   }
@@ -154,6 +155,7 @@ void GoalWay::walked(const GoalWayParams& params, const Input& in, LevelStep::Ou
   if (++refused_ticks_ < params.sure_ticks || gave_up_for_) return;
   refused_ticks_ = 0;
   const bool shut = outcome != LevelStep::Outcome::kArrived;
+  const bool below_or_above = !shut && !goes_round_ && !in.goal.is_at_height(middle_of(in.soles).position_m.z());
   if (shut && !first_refusal_) first_refusal_ = refusal;
   if (shut && refusals_ == 0) ++shut_places_;  // who waits before a thing that may go is in one place
   const bool searched = shut_places_ > params.most_refusals || steps_ >= params.most_steps;
@@ -169,7 +171,7 @@ void GoalWay::walked(const GoalWayParams& params, const Input& in, LevelStep::Ou
     gave_up_for_ = first_refusal_;
   } else if (looks_first()) {
     look_.done = true;  // from as near as it could come
-  } else if (outcome == LevelStep::Outcome::kArrived) {
+  } else if (below_or_above) {
     look_round(params, in);
   } else if (outcome == LevelStep::Outcome::kNoGround) {
     bar_unseen(in);

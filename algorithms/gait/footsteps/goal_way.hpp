@@ -54,8 +54,7 @@ struct GoalWayParams {
           "Where it stood before a thing and came no further, no way leads through so much about its place.");
     field("face_again_m", p.face_again_m, 0.1, 10.0,
           "Going round below or above the goal it turns to what is in the way again after as far: stairs may begin "
-          "there. "
-          "Chosen by hand for landings.");
+          "there. Chosen by hand for landings.");
     field(
         "sure_ticks", p.sure_ticks, 0, 10000,
         "It looks so long at what is in the way before it goes round, and at ground before it believes there is none.");

@@ -71,7 +71,7 @@ class GroundRoute {
   Vec2 corner_m_ = Vec2::Zero(), from_m_ = Vec2::Zero(), via_m_ = Vec2::Zero();
   Cell start_;
   Rows shut_{};     // no way leads there
-  Rows dear_{};     // a way that leads there counts double: it was never seen
+  Rows dear_{};     // a way that leads there counts double: it was never seen, or walked on
   Rows reached_{};  // by a wave that starts at the goal
   Rows front_{}, late_{};
   std::uint8_t now_ = 0;

@@ -10,7 +10,7 @@
 
 namespace polygmap {
 
-// Odometry, plan view.
+// Odometry.
 struct WalkGoal {
   Vec2 odom_p_m = Vec2::Zero();  // of the middle between the feet
   double yaw_rad = 0.0;
@@ -25,10 +25,10 @@ struct WalkGoal {
   [[nodiscard]] bool is_at_height(double z_m) const noexcept {
     return !has_height || std::abs(odom_z_m - z_m) < kSameHeight_m;
   }
-  // From the ground of that height a rise, negative down, comes nearer to its height. None: its height says nothing.
+  // From the ground at z_m a rise, negative down, comes nearer to its height. None: its height says nothing.
   [[nodiscard]] std::optional<bool> is_by_rise(double z_m, double rise_m) const noexcept {
     if (is_at_height(z_m) || rise_m == 0.0) return std::nullopt;
-    return (odom_z_m > z_m) == (rise_m > 0.0);
+    return std::abs(odom_z_m - z_m - rise_m) < std::abs(odom_z_m - z_m);
   }
 };
 

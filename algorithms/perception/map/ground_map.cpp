@@ -168,17 +168,24 @@ bool GroundMap::tell(GroundView& out) noexcept {
 }
 
 void GroundMap::leave_out(const Transform& map_T_local, const ConvexPolygon& local, GroundView& out) noexcept {
-  const auto corner = [&](std::size_t i) -> Vec2 {
+  constexpr double kFar_m = 1e3, kStorey_m = 0.15;  // what begins farther above or below lies on another storey
+  const auto corner = [&](std::size_t i) -> Vec3 {
     const Vec2& p_m = local[i % local.size()];
-    return (map_T_local * Vec3{p_m.x(), p_m.y(), 0.0}).head<2>() - out.corner_m;
+    return map_T_local * Vec3{p_m.x(), p_m.y(), 0.0} - Vec3{out.corner_m.x(), out.corner_m.y(), out.height_m};
   };
-  constexpr double kFar_m = 1e3;
+  double lowest_m = kFar_m, highest_m = -kFar_m;
+  for (std::size_t i = 0; i < local.size(); ++i) {
+    lowest_m = std::min(lowest_m, corner(i).z());
+    highest_m = std::max(highest_m, corner(i).z());
+  }
+  work_.add(local.size(), 30);
+  if (lowest_m > kStorey_m || highest_m < -kStorey_m) return;
   std::array<double, GroundView::kSide_cells> first_m{}, last_m{};  // of a row's middle line
   first_m.fill(kFar_m);
   last_m.fill(-kFar_m);
   work_.add(2 * GroundView::kSide_cells, 30);
   for (std::size_t i = 0; i < local.size(); ++i) {
-    const Vec2 a_m = corner(i), b_m = corner(i + 1);
+    const Vec2 a_m = corner(i).head<2>(), b_m = corner(i + 1).head<2>();
     const double low_m = std::min(a_m.y(), b_m.y()), high_m = std::max(a_m.y(), b_m.y());
     const std::int32_t last = std::min(GroundView::cell_of(high_m), GroundView::kSide_cells - 1);
     work_.add(100);

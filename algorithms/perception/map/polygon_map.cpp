@@ -217,7 +217,7 @@ void PolygonMap::leave_out_slope() noexcept {
   const auto from = tracks_.begin() + static_cast<std::ptrdiff_t>(pass_.track);
   const auto next = std::find_if(from, tracks_.end(), [&](const MapTrack& track) {
     const double up = track.map_T_local.R(2, 2);
-    return up > kSteepest && up < level && track.sightings > 1 && !track.erased;
+    return up > kSteepest && up < level && track.sightings >= params_.memory.confirmed_sightings && !track.erased;
   });
   work_.add(static_cast<std::size_t>(next - from), 10);
   if (next == tracks_.end()) {

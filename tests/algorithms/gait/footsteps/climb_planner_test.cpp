@@ -230,5 +230,39 @@ TEST(ClimbPlanner, StairsLeadUpToAGoalAboveAndBehind_ClimbsThemAndNoneDown) {
   EXPECT_TRUE(on.planner.look_and_decide(on.situation, next).walks);
 }
 
+// Over a platform to a goal at the height of the floor that it came from.
+TEST(ClimbPlanner, FlightLeadsAwayFromTheGoalsHeightFirst_GoesOnAsItWent) {
+  OnATread on;
+  on.planner.go_to({.ahead_m = 4.0, .up_m = -0.13, .has_height = true});
+  on.planner.lay_out_destination(on.situation.soles);
+  FootholdSet next = next_tread(on);
+  next.measured_rise_m = 0.13;
+  EXPECT_EQ(on.planner.look_and_decide(on.situation, next).goal.kind, StepKind::kLeading);
+}
+
+TEST(ClimbPlanner, StandsBelowItsGoal_SaysThatItSawNoWayUp) {
+  OnATread on;
+  on.planner.go_to({.up_m = 1.0, .has_height = true});
+  on.planner.lay_out_destination(on.situation.soles);
+  FootholdSet nothing = next_tread(on);
+  nothing.has_p_star = false;
+  nothing.obstruction = StopReason::kNoStaircase;
+  EXPECT_TRUE(on.planner.look_and_decide(on.situation, nothing).walks);
+  for (int i = 0; i < 50; ++i) static_cast<void>(on.planner.look_and_decide(on.situation, nothing));
+  EXPECT_EQ(on.planner.look_and_decide(on.situation, nothing).obstruction, StopReason::kNoWayUpOrDown);
+}
+
+TEST(ClimbPlanner, AskedWithAFootInTheAir_HeightCountsFromTheOtherOne) {
+  OnATread on;
+  on.planner.go_to({.has_height = true});
+  SolePair soles = on.situation.soles;
+  soles[0].position_m.z() += 0.2;
+  on.planner.lay_out_destination(soles);
+  FootholdSet nothing = next_tread(on);
+  nothing.has_p_star = false;
+  nothing.obstruction = StopReason::kNoStaircase;
+  EXPECT_EQ(on.planner.look_and_decide(on.situation, nothing).obstruction, StopReason::kAtGoal);
+}
+
 }  // namespace
 }  // namespace polygmap

@@ -137,7 +137,7 @@ TEST_F(GoalWayTest, StairsUpToAGoalAbove_AreLookedAtWhereverItLies) {
   EXPECT_TRUE(way_.looks_first());
 }
 
-TEST_F(GoalWayTest, ArrivedBelowTheGoal_LooksRoundAndThenGivesNoWay) {
+TEST_F(GoalWayTest, ArrivedBelowTheGoal_LooksRoundSoOften) {
   goal_ = {.odom_p_m = {0.0, 0.0}, .odom_z_m = 2.0, .has_height = true};
   double yaw_rad = 0.0;
   for (int i = 0; i < params_.most_turns; ++i) {
@@ -151,6 +151,21 @@ TEST_F(GoalWayTest, ArrivedBelowTheGoal_LooksRoundAndThenGivesNoWay) {
   }
   walked(params_.sure_ticks, LevelStep::Outcome::kArrived);
   EXPECT_FALSE(way_.looks_first());
+}
+
+TEST_F(GoalWayTest, ArrivedAtAGoalOfNoHeight_LooksNotRound) {
+  goal_ = {.odom_p_m = {0.0, 0.0}};
+  walked(params_.sure_ticks, LevelStep::Outcome::kArrived);
+  EXPECT_FALSE(way_.looks_first());
+}
+
+TEST_F(GoalWayTest, StairsThatLeadAwayFromTheGoalsHeight_AreNoLastWay) {
+  goal_ = {.odom_p_m = {0.5, -1.0}, .odom_z_m = 2.0, .has_height = true};
+  footholds_.has_p_star = true;
+  footholds_.measured_rise_m = -0.13;
+  see_stairs(0.1, 0.9, 0.7, StopReason::kNone);
+  walked(2 * params_.sure_ticks, LevelStep::Outcome::kBlocked);
+  EXPECT_FALSE(way_.takes_any_stairs());
 }
 
 // As beside the open side of the flight below: where it cannot turn to what is in the way it has looked all it can.

@@ -147,6 +147,7 @@ TEST_F(LevelWalkTest, GoalOnAnotherStorey_IsNotArrivedAt) {
   EXPECT_EQ(goal.is_by_rise(0.0, 0.15), std::optional(true));
   EXPECT_EQ(goal.is_by_rise(0.0, -0.15), std::optional(false));
   EXPECT_EQ(goal.is_by_rise(0.15, -0.15), std::nullopt);
+  EXPECT_EQ(goal.is_by_rise(0.05, 0.22), std::optional(false)) << "farther beyond it than it is now";
   goal.has_height = false;
   EXPECT_TRUE(walk_.has_arrived(soles_, goal));
 }

@@ -83,6 +83,8 @@ TEST_F(GroundMapTest, RampSeenAmidTheFloor_IsLeftOutWithTwoSquaresAboutIt) {
   const GroundView before = told_;
   map_->leave_out({Mat3::Identity(), Vec3{9.0, 9.0, 0.0}}, outline, told_);
   EXPECT_EQ(told_.level, before.level) << "out of the view";
+  map_->leave_out({Mat3::Identity(), Vec3{0.3, 0.0, -0.5}}, outline, told_);
+  EXPECT_EQ(told_.level, before.level) << "on the storey below";
 }
 
 // A polygon around it would be convex.

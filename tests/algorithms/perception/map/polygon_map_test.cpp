@@ -41,6 +41,36 @@ TEST_F(PolygonMapTest, PatchesOfOneTreadBesideTheRobotsLeg_AreOneTread) {
   EXPECT_EQ(counters().created, 1U);
 }
 
+// Where the robot is met, ground is taken to be level about its soles; here none of it is seen but one surface ahead.
+TEST_F(PolygonMapTest, SlopeAhead_IsNoLevelGroundOnceItIsConfirmed) {
+  const auto tells_level_there = [&](double slope_rad, int frames) {
+    map_ = std::make_unique<PolygonMap>(PolygonMap::Params{});
+    const Transform camera = looking_down({0.3, 0, 1});
+    SurfacePatch patch = level_patch({0.3, 0, 0.0}, 0.1, 0.1);
+    patch.normal = Vec3{-math::sin(slope_rad), 0.0, math::cos(slope_rad)};
+    patch.d_m = -patch.normal.dot(patch.centroid_m);
+    for (Vec3& v : patch.polygon) v = Plane{patch.normal, patch.d_m}.project(v);
+    PolygonMap::View view{camera, 0.0, 0.0, robot_camera_intrinsics()};
+    view.tell_ground = true;
+    view.stands = {true, true};
+    view.sole = SoleModel{}.contact;
+    view.odom_T_sole = {Transform{Mat3::Identity(), Vec3{0.0, 0.1, 0.0}},
+                        Transform{Mat3::Identity(), Vec3{0.0, -0.1, 0.0}}};
+    for (int i = 0; i < frames; ++i) {
+      stamp_ns_ += kFrame_ns;
+      map_->begin(in_camera({patch}, camera, stamp_ns_), view);
+      WorkBudget budget(1 << 20);
+      EXPECT_EQ(map_->step(budget), Progress::kDone);
+    }
+    const GroundView& ground = map_->snapshot().ground;
+    const Vec2 p_m = Vec2{0.3, 0.0} - ground.corner_m;
+    return GroundView::has(ground.level, GroundView::cell_of(p_m.x()), GroundView::cell_of(p_m.y()));
+  };
+  EXPECT_TRUE(tells_level_there(0.02, 8));
+  EXPECT_FALSE(tells_level_there(0.06, 8));
+  EXPECT_TRUE(tells_level_there(0.06, 2)) << "two noisy frames";
+}
+
 // Risers are matched from up to 60 mm off, and may have moved by 25 mm.
 TEST_F(PolygonMapTest, RiserSeenElsewhere_OnlyItsOutliersCountUntilTheyPersist) {
   const Transform camera = looking_down({0, 0, 1});
