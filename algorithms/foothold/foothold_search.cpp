@@ -18,7 +18,8 @@ bool valid(const FootholdSearch::Query& q) noexcept {
 // From the map's frame, in which the base is given, to odometry, where a foot is told to go.
 FootholdSet moved(FootholdSet set, const Vec3& by_m, const FootholdSearch::Query& query, const PlanFrame& base,
                   double seen_behind_m) noexcept {
-  for (Vec3* p : {&set.p_star.position_m, &set.tread.nosing_a_m, &set.tread.nosing_b_m}) {
+  for (Vec3* p : {&set.p_star.position_m, &set.tread.nosing_a_m, &set.tread.nosing_b_m, &set.lip_beyond.nosing_a_m,
+                  &set.lip_beyond.nosing_b_m}) {
     *p += by_m;
   }
   set.ground.corner_m += by_m.head<2>();

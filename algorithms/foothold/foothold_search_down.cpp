@@ -25,9 +25,10 @@ const Lip* FootholdSearch::lip_ahead() const noexcept {
     nearest = &lip;
     nearest_m = ahead_m;
   }
-  // Up comes first where both are ahead.
-  const bool rises =
-      found_.next != kNone && math::sqrt(found_.next_distance2_m2) < nearest_m + params_.down.level_gap_m;
+  if (nearest == nullptr || found_.next == kNone) return nearest;
+  // Up comes first where both are ahead. A tread that it came down from is behind it, even where its map reaches ahead.
+  const bool is_ahead = nearest->heading.dot(centroid_m(levels_[found_.next].hull) - sole_p_m) > 0.0;
+  const bool rises = is_ahead && math::sqrt(found_.next_distance2_m2) < nearest_m + params_.down.level_gap_m;
   return rises ? nullptr : nearest;
 }
 
@@ -84,6 +85,8 @@ StopReason FootholdSearch::judge_below(const Lip& lip, std::size_t level) noexce
   pending_.measured_rise_m = tread.height_m - z_foot_;
   pending_.measured_tread_m = tread.depth_m;
   pending_.tread = {over.left_m, over.right_m};
+  pending_.has_lip_beyond = tread.ends.lip.has_value();
+  if (tread.ends.lip) pending_.lip_beyond = {tread.ends.lip->left_m, tread.ends.lip->right_m};
   if (-pending_.measured_rise_m > params_.down.drop_max_m) return StopReason::kDropTooDeep;
   const double step_max_m = query_.climbing ? params_.step_max_m : std::numeric_limits<double>::infinity();
   const StopReason judged = judge_tread(tread, z_foot_, sole_.origin_m(), step_max_m, pending_.p_star_feet);

@@ -3,8 +3,10 @@
 
 #include <algorithm>
 #include <memory>
+#include <utility>
 
 #include "algorithms/geometry/line.hpp"
+#include "algorithms/geometry/oriented_rectangle.hpp"
 
 namespace polygmap {
 namespace {
@@ -80,7 +82,7 @@ void ClimbPlanner::restart() noexcept {
   floor_.stride_share = 1.0;
   floor_.steps = floor_.corrections = 0;
   way_.forget();
-  passing_refused_ = closes_up_ = false;
+  passing_refused_ = closes_up_ = trails_beside_ = false;
   reach_over_lip_m_ = params_.lip.far_m;
   odom_stood_.reset();
   slid_.reset();
@@ -94,12 +96,23 @@ ClimbPlanner::Decision ClimbPlanner::trailing_step(const Situation& situation,
   StepGoal& goal = decision.goal;
   goal.kind = StepKind::kTrailing;
   goal.foot = other(memory_.leading);
+  if (memory_.trails_to_lip && trails_beside_) {
+    goal.foothold = memory_.trailing_foothold;
+    goal.target = sole_beside_on_tread(situation.soles[index_of(memory_.leading)], goal.foot, landed_,
+                                       robot_->stance.half_width_m);
+    goal.foothold.position_m = goal.target.position_m;
+    return decision;
+  }
   // The search looks from the foot that stands and soon offers the tread above: then the memory holds.
   const Foothold& seen = footholds.p_star_feet[index_of(goal.foot)];
-  const bool same_tread =
-      footholds.has_p_star && seen.polygon_id == memory_.trailing_foothold.polygon_id && usable(seen);
+  const bool same_tread = footholds.has_p_star && seen.polygon_id == memory_.trailing_foothold.polygon_id &&
+                          usable(seen) && footholds.has_lip_beyond >= memory_.trails_to_lip;
   goal.foothold = same_tread ? seen : memory_.trailing_foothold;
   goal.target = sole_on(goal.foothold);
+  decision.trails_to_lip = memory_.trails_to_lip;
+  if (same_tread && memory_.trails_to_lip) {
+    decision.trails_to_lip = trail_to_lip(footholds, situation.soles[index_of(memory_.leading)], goal);
+  }
   if (situation.stamp_ns - goal.foothold.last_seen_ns <= params_.remembered_ns) return decision;
   // Odometry has wandered since, but not from the foot that stands there: as far from it as the two footholds were.
   goal.foothold = memory_.trailing_foothold;
@@ -107,6 +120,35 @@ ClimbPlanner::Decision ClimbPlanner::trailing_step(const Situation& situation,
   goal.foothold.position_m = situation.soles[index_of(memory_.leading)].position_m + memory_.odom_trailing_m;
   goal.target = sole_on(goal.foothold);
   return decision;
+}
+
+bool ClimbPlanner::trail_to_lip(const FootholdSet& footholds, const SolePose& leading,
+                                StepGoal& trailing) const noexcept {
+  if (trails_beside_ || !footholds.has_lip_beyond) return false;
+  const Nosing lip{footholds.lip_beyond.nosing_a_m, footholds.lip_beyond.nosing_b_m};
+  const Vec2 along = (lip.odom_p_b - lip.odom_p_a).head<2>();
+  if (!(along.norm() > 0.0)) return false;
+  const Vec2 over = left_of(along);
+  const double yaw_rad = trailing.target.yaw_rad;
+  const double turn_rad = math::clamp(math::wrap_angle(math::atan2(over.y(), over.x()) - yaw_rad),
+                                      -params_.floor.turn_rad, params_.floor.turn_rad);
+  SolePose target = trailing.target;
+  target.yaw_rad = math::wrap_angle(yaw_rad + turn_rad);
+  const double to_lip_m = toe_to_line_m(robot_->sole.collision, target, lip, target.yaw_rad);
+  const double ahead_m = to_lip_m - params_.lip.trailing_stand_off_m;
+  if (to_lip_m < params_.lip.near_m || ahead_m > params_.lip.trailing_ahead_m) return false;
+  const Vec2 way_m = ahead_m * unit_at(target.yaw_rad);
+  target.position_m.head<2>() += way_m;
+  target.position_m.z() -= target.up.head<2>().dot(way_m) / target.up.z();
+  if (overlap(foot_rectangle(robot_->sole.collision, target, params_.floor.overlap_margin_m),
+              foot_rectangle(robot_->sole.collision, leading, params_.floor.overlap_margin_m)))
+    return false;
+  Foothold& foothold = trailing.foothold;
+  foothold.nosing_distance_m += unit_at(yaw_rad).dot(way_m);
+  foothold.position_m = target.position_m;
+  foothold.yaw_rad = target.yaw_rad;
+  trailing.target = target;
+  return true;
 }
 
 // The rear foot's p** is the standing foot's p*. A search from before the standing foot landed has its tread for p* and
@@ -185,14 +227,14 @@ bool ClimbPlanner::lined_up(const Situation& situation, const StandOff& to, std:
              (to.at_lip ? params_.lip.min_stand_off_m : params_.min_stand_off_m);
 }
 
-double ClimbPlanner::to_lip_m(const Situation& situation, const FootholdSet& footholds) const noexcept {
+std::array<double, kFootCount> ClimbPlanner::to_lip_m(const Situation& situation,
+                                                      const FootholdSet& footholds) const noexcept {
   const StandOff to = stand_off(situation, footholds);
-  double farthest_m = 0.0;
-  for (const SolePose& sole : situation.soles) {
-    if (!to.at_lip) break;
-    farthest_m = std::max(farthest_m, toe_to_line_m(robot_->sole.collision, sole, to.nosing, to.yaw_rad));
-  }
-  return farthest_m;
+  if (!to.at_lip) return {};
+  const auto of = [&](Foot foot) {
+    return toe_to_line_m(robot_->sole.collision, situation.soles[index_of(foot)], to.nosing, to.yaw_rad);
+  };
+  return {of(Foot::kLeft), of(Foot::kRight)};
 }
 
 bool ClimbPlanner::floor_goal(const Situation& situation, const FootholdSet& footholds, StepGoal& goal) const noexcept {
@@ -257,10 +299,12 @@ StepGoal ClimbPlanner::closing_goal(const Situation& situation, const FootholdSe
 }
 
 bool ClimbPlanner::come_nearer(const Decision& leading) noexcept {
-  if (!on_treads_ || leading.to_lip_m <= params_.lip.near_m) return false;
-  reach_over_lip_m_ = params_.lip.near_m;
+  if (!on_treads_ || leading.to_lip_m <= 0.0 || reach_over_lip_m_ == 0.0) return false;
+  reach_over_lip_m_ = leading.to_lip_m > params_.lip.near_m ? params_.lip.near_m : 0.0;
   return true;
 }
+
+bool ClimbPlanner::trail_beside() noexcept { return !std::exchange(trails_beside_, true); }
 
 bool ClimbPlanner::close_up(const Situation& situation) noexcept {
   const double apart_m = (situation.soles[0].position_m - situation.soles[1].position_m).norm();
@@ -405,7 +449,15 @@ ClimbPlanner::Decision ClimbPlanner::decide(const Situation& situation, const Fo
     decision.obstruction = StopReason::kMapStale;
     return decision;
   }
-  decision.to_lip_m = to_lip_m(situation, footholds);
+  const std::array<double, kFootCount> to_lip = to_lip_m(situation, footholds);
+  // The foot that trailed to the lip carries.
+  constexpr double kStaggered_m = 0.03;
+  Foot lead = leading_foot(situation, targets);
+  if (on_treads_ && std::abs(to_lip[0] - to_lip[1]) > kStaggered_m) {
+    lead = to_lip[0] > to_lip[1] ? Foot::kLeft : Foot::kRight;
+  }
+  const Foot trail = other(lead);
+  decision.to_lip_m = to_lip[index_of(trail)];
   const bool lines_up = !on_treads_ || decision.to_lip_m > reach_over_lip_m_;
   if (lines_up && floor_goal(situation, footholds, decision.goal)) {
     decision.has_step = floor_.corrections < params_.line_up.max_corrections && floor_.steps < params_.max_floor_steps;
@@ -417,9 +469,9 @@ ClimbPlanner::Decision ClimbPlanner::decide(const Situation& situation, const Fo
   decision.has_step = !walks_up;
   if (walks_up) return decision;
 
-  const Foot lead = leading_foot(situation, targets), trail = other(lead);
   decision.goal = {StepKind::kLeading, lead, targets[index_of(lead)], feet[index_of(lead)]};
   decision.trailing = {StepKind::kTrailing, trail, targets[index_of(trail)], feet[index_of(trail)]};
+  decision.trails_to_lip = decision.rise_m < 0.0 && trail_to_lip(footholds, decision.goal.target, decision.trailing);
   return decision;
 }
 
@@ -443,6 +495,7 @@ void ClimbPlanner::latched(const Situation& situation, const Decision& decision)
     memory_.led_down = decision.rise_m < 0.0;
     memory_.trailing_foothold = decision.trailing.foothold;
     memory_.odom_trailing_m = decision.trailing.foothold.position_m - decision.goal.target.position_m;
+    memory_.trails_to_lip = decision.trails_to_lip;
   }
 }
 
@@ -489,6 +542,7 @@ void ClimbPlanner::landed(const std::optional<SolePair>& soles) noexcept {
       break;
     case StepKind::kTrailing:
       split_stance_ = passing_refused_ = false;
+      if (reach_over_lip_m_ == 0.0) reach_over_lip_m_ = params_.lip.near_m;
       ++treads_climbed_;
       break;
   }

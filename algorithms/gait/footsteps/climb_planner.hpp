@@ -64,6 +64,8 @@ class ClimbPlanner {
     double clearance_m = 0.006;
     double far_m = 0.08;
     double near_m = 0.035;
+    double trailing_stand_off_m = 0.02;
+    double trailing_ahead_m = 0.13;
 
     static void visit(auto& p, auto& field) {
       field("stand_off_m", p.stand_off_m, 0.0, 0.3, "Collision toe to the lip.");
@@ -75,6 +77,10 @@ class ClimbPlanner {
           "near_m", p.near_m, 0.0, 0.5,
           "Where the legs refuse a step from farther off, it comes nearer first, and on the treads that follow, too.");
       field.ordered("near_m", "far_m");
+      field("trailing_stand_off_m", p.trailing_stand_off_m, 0.0, 0.3,
+            "Collision toe to the next lip of a foot that trails there: that lip was seen from a tread higher.");
+      field("trailing_ahead_m", p.trailing_ahead_m, 0.0, 0.3,
+            "It goes no farther ahead of where it would stand beside the other one.");
     }
   };
   // When the feet are lined up before the stairs.
@@ -172,8 +178,9 @@ class ClimbPlanner {
     StepGoal trailing;                           // the step that may come after a leading or passing one
     StopReason obstruction = StopReason::kNone;  // without a step: why
     double measured_m = 0.0;
-    double rise_m = 0.0;    // of a leading step, negative down
-    double to_lip_m = 0.0;  // of the foot that is farther from the lip that it leads over
+    double rise_m = 0.0;         // of a leading step, negative down
+    bool trails_to_lip = false;  // the trailing step, this one or the one that may come, goes on to the next lip
+    double to_lip_m = 0.0;       // from the foot that carries to the lip that it leads over; 0 where it leads over none
   };
 
   // robot: outlives the planner.
@@ -197,8 +204,11 @@ class ClimbPlanner {
   bool shorten_floor_steps() noexcept;
   // The legs cannot pass the standing foot: the next step ends beside it.
   void refuse_passing() noexcept { passing_refused_ = true; }
-  // The legs cannot do that leading step. False when it begins as near to the lip as it may.
+  // The legs cannot do that leading step: from now on it begins nearer to the lip, and at last with both feet lined up
+  // there. False when it does already.
   [[nodiscard]] bool come_nearer(const Decision& leading) noexcept;
+  // They cannot trail so far ahead, to the next lip: no step does any more. False when none did.
+  [[nodiscard]] bool trail_beside() noexcept;
   // The legs cannot lead on. A foot that landed farther out, in a stance too wide for the ankle rolls of both legs,
   // comes back beside the other one first. False when the feet are close enough already.
   [[nodiscard]] bool close_up(const Situation& situation) noexcept;
@@ -224,6 +234,9 @@ class ClimbPlanner {
   [[nodiscard]] bool leads_to_goal(const Situation& situation, const FootholdSet& footholds) const noexcept;
   [[nodiscard]] Decision walk(const Situation& situation, const FootholdSet& footholds) const noexcept;
   [[nodiscard]] Decision trailing_step(const Situation& situation, const FootholdSet& footholds) const noexcept;
+  // Down: the foot that trails goes on ahead of the other one on its tread, to the lip where that ends. There it
+  // carries while the other one leads over, and nobody walks on the tread.
+  bool trail_to_lip(const FootholdSet& footholds, const SolePose& leading, StepGoal& trailing) const noexcept;
   // Past the standing foot onto the tread beyond it; false when there is none to be sure of.
   [[nodiscard]] bool passing_step(const Situation& situation, const FootholdSet& footholds,
                                   Decision& decision) const noexcept;
@@ -237,8 +250,9 @@ class ClimbPlanner {
   struct StandOff;
   [[nodiscard]] StandOff stand_off(const Situation& situation, const FootholdSet& footholds) const noexcept;
   [[nodiscard]] bool lined_up(const Situation& situation, const StandOff& to, std::size_t foot) const noexcept;
-  // Of the foot that is farther from it; 0 where it leads over none.
-  [[nodiscard]] double to_lip_m(const Situation& situation, const FootholdSet& footholds) const noexcept;
+  // From each collision toe; 0 where it leads over none.
+  [[nodiscard]] std::array<double, kFootCount> to_lip_m(const Situation& situation,
+                                                        const FootholdSet& footholds) const noexcept;
   [[nodiscard]] Foot leading_foot(const Situation& situation, const SolePair& targets) const noexcept;
 
   Params params_;
@@ -252,7 +266,8 @@ class ClimbPlanner {
     std::int32_t swings_in_a_row = 1;  // of that foot
     Foot leading = Foot::kLeft;
     bool has_leading = false;
-    bool led_down = false;  // the step that led last
+    bool led_down = false;       // the step that led last
+    bool trails_to_lip = false;  // so does its trailing foothold
   } memory_, before_latch_;
   struct {
     std::optional<Destination> asked;
@@ -264,6 +279,7 @@ class ClimbPlanner {
   bool split_stance_ = false;  // the leading foot stands on a tread, the other one below: the trailing step ends this
   bool passing_refused_ = false;
   bool closes_up_ = false;
+  bool trails_beside_ = false;          // the legs refused to trail to a lip
   double reach_over_lip_m_ = 0.0;       // from so far off the legs have not refused to go down yet
   SolePose landed_;                     // where the foot that landed last was to
   std::optional<SolePair> odom_stood_;  // both soles when it landed

@@ -25,11 +25,12 @@ void SwingPhase::begin(const GaitInput& in, GaitShared& gait, const ClimbPlanner
     odom_off_path_m_ = in.state.odom_T_sole[index_of(goal_.foot)].p_m - start.p_m;
     odom_off_path_m_.z() = 0.0;
   }
-  // A riser may be at its heel: it goes on from where it stands, which is ahead of where the plan has it. On the level,
-  // where the legs have ranges to spare: feet stood up to 16 mm ahead in climbs of the simulation.
+  // A riser may be at its heel: it goes on from where it stands, which is ahead of where the plan has it. Where
+  // the legs have ranges to spare: feet stood up to 16 mm ahead in climbs of the simulation.
   constexpr double kMostAhead_m = 0.02;
   const double ahead_m = math::clamp(start.R.col(0).dot(odom_off_path_m_), 0.0, kMostAhead_m);
-  if (goal_.kind == StepKind::kFloor && plan.shape.retreat_m < 0.0) plan.shape.retreat_m -= ahead_m;
+  const bool leads_down = goes_down(goal_, soles) && leads(goal_.kind);
+  if ((goal_.kind == StepKind::kFloor || leads_down) && plan.shape.retreat_m < 0.0) plan.shape.retreat_m -= ahead_m;
   path_.plan(gait.robot.sole, start, goal_.target, plan.shape, plan.swing_ticks);
   body.move_torso(plan.touch_down, plan.swing_ticks, plan.rise_ticks);
   zmp_stance_m_ = plan.zmp_stance_m;

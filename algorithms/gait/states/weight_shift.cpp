@@ -61,6 +61,8 @@ Transition WeightShift::legs_cannot(const GaitInput& in, GaitShared& gait) const
     gait.planner.refuse_passing();
     return Transition::shift(gait.planner.decide(situation(in), in.footholds), false);
   }
+  const bool cannot_trail = kind == StepKind::kTrailing || search_.leading_found();
+  if (decision_.trails_to_lip && cannot_trail && gait.planner.trail_beside()) return Transition::stand();
   if (kind == StepKind::kFloor && gait.planner.shorten_floor_steps()) return Transition::stand();
   if (kind == StepKind::kLeading && gait.planner.come_nearer(decision_)) return Transition::stand();
   gait.memory.rests_first = true;

@@ -88,7 +88,8 @@ StepPlan plan_step(const StepParams& params, const StepGoal& goal, const SolePai
                          : params.stair_swing;
   const SolePose& from = soles[index_of(goal.foot)];
   const Vec2 way_m = (goal.target.position_m - from.position_m).head<2>();
-  if (goal.kind == StepKind::kFloor && unit_at(from.yaw_rad).dot(way_m) > params.down.leave_m) {
+  const bool walks_on = goal.kind == StepKind::kFloor && unit_at(from.yaw_rad).dot(way_m) > params.down.leave_m;
+  if (walks_on || (down && leads(goal.kind))) {
     plan.shape.retreat_m -= params.down.leave_m;
   }
   plan.shift_ticks = on_floor ? params.durations.floor_shift_ticks : params.durations.stair_shift_ticks;

@@ -109,7 +109,7 @@ struct StepDownParams {
     field("turn_rad", p.turn_rad, 0.0, 0.5, "It turns by this, the hip of the leading foot ahead.");
     field("com_above_base_m", p.com_above_base_m, 0.0, 0.5, "Centre of mass above the base, with legs bent.");
     field("leave_m", p.leave_m, 0.0, 0.05,
-          "A foot that walks ahead goes by this farther ahead as it lifts: a riser that it came down may be "
+          "A foot that walks or leads down goes by this farther ahead as it lifts: a riser that it came down may be "
           "at its "
           "heel.");
     field("rest_margin_rad", p.rest_margin_rad, 0.0, 0.5,

@@ -21,6 +21,7 @@ class StepSearch {
              const std::array<Transform, kFootCount>& soles) noexcept;
   State step(const RobotModel& robot, const StepParams& params) noexcept;
   [[nodiscard]] State state() const noexcept { return state_; }
+  [[nodiscard]] bool leading_found() const noexcept { return leading_found_; }  // then it is the one after that fails
   [[nodiscard]] const StepPlan& plan() const noexcept { return plan_; }
 
  private:

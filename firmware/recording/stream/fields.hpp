@@ -252,6 +252,8 @@ void each_field(auto& f, Of<FootholdSet> auto& m) {
   walk(f, "p_star_feet", m.p_star_feet);
   walk(f, "p_star_star_feet", m.p_star_star_feet);
   walk(f, "tread", m.tread);
+  walk(f, "lip_beyond", m.lip_beyond);
+  walk(f, "has_lip_beyond", m.has_lip_beyond);
   walk(f, "obstruction", m.obstruction);
   walk(f, "unsteady", m.unsteady);
   walk(f, "measured_rise_m", m.measured_rise_m);

@@ -82,6 +82,18 @@ TEST_F(FootholdSearchDown, LipAhead_BothFeetLieOnTheTreadBelow) {
   }
 }
 
+TEST_F(FootholdSearchDown, TreadBelowDropsOn_ItsLipIsTold) {
+  EXPECT_FALSE(FootholdSet{}.has_lip_beyond);
+  const FootholdSet& r = search(platform_map(0.13), before_lip());
+  ASSERT_TRUE(r.has_lip_beyond);
+  EXPECT_NEAR(r.lip_beyond.nosing_a_m.x(), kLip_x_m + kLowerTread_m, 1e-9);
+  EXPECT_GT(r.lip_beyond.nosing_a_m.y(), r.lip_beyond.nosing_b_m.y()) << "the left end first";
+
+  MapSnapshot floor = platform_map(0.13);
+  floor.polygons[1].surface.back_drops = false;
+  EXPECT_FALSE(search(floor, before_lip()).has_lip_beyond);
+}
+
 TEST_F(FootholdSearchDown, DownIsNoWay_NothingIsOffered) {
   const FootholdSet& r = search(platform_map(0.13), before_lip(false));
   EXPECT_FALSE(r.has_p_star);
@@ -118,6 +130,17 @@ TEST_F(FootholdSearchDown, HigherTreadBeforeTheLip_UpComesFirst) {
   EXPECT_TRUE(map.polygons.try_push_back(higher));
   const FootholdSet& r = search(map, before_lip());
   EXPECT_GT(r.measured_rise_m, 0.0);
+}
+
+// A corner of it was merged from what lies elsewhere, as in a climb down of 2026-12-01.
+TEST_F(FootholdSearchDown, MapOfTheTreadBehindReachesAhead_TheWayGoesDownAllTheSame) {
+  MapSnapshot map = platform_map(0.13);
+  MapPolygon behind = surface_at(4, 0.13, -0.5, -0.2, false);
+  behind.surface.polygon[1] = {0.2, -0.4, 0.13};
+  EXPECT_TRUE(map.polygons.try_push_back(behind));
+  const FootholdSet& r = search(map, before_lip());
+  ASSERT_EQ(r.obstruction, StopReason::kNone) << name_of(r.obstruction);
+  EXPECT_NEAR(r.measured_rise_m, -0.13, 1e-9);
 }
 
 TEST_F(FootholdSearchDown, TreadTooShortForTheFoot_IsSaidWithItsDepth) {

@@ -264,5 +264,91 @@ TEST(ClimbPlanner, AskedWithAFootInTheAir_HeightCountsFromTheOtherOne) {
   EXPECT_EQ(on.planner.look_and_decide(on.situation, nothing).obstruction, StopReason::kAtGoal);
 }
 
+// A deep tread below the lip that both feet stand before: from x = 1.2 to 1.56.
+constexpr double kNextLip_x_m = 1.56;
+FootholdSet deep_tread_below(const OnATread& on) {
+  FootholdSet set = next_tread(on);
+  set.measured_rise_m = -0.15;
+  const double heel_m = on.robot.sole.collision.heel_x_m;
+  set.lip_beyond = {{kNextLip_x_m, 0.5, -0.02}, {kNextLip_x_m, -0.5, -0.02}};
+  set.has_lip_beyond = true;
+  for (std::size_t i = 0; i < kFootCount; ++i) {
+    set.p_star_feet[i].position_m.x() = 1.22 - heel_m;
+    set.p_star_feet[i].position_m.z() = -0.02;
+  }
+  return set;
+}
+double toe_to_next_lip_m(const OnATread& on, const SolePose& sole) {
+  return kNextLip_x_m - sole.position_m.x() - on.robot.sole.collision.toe_x_m;
+}
+// Both toes stand before the lip, as if they had been lined up there.
+void stand_at_lip(OnATread& on) {
+  const double toe_m = on.robot.sole.collision.toe_x_m;
+  for (SolePose& sole : on.situation.soles) sole.position_m.x() = 1.2 - on.params.lip.stand_off_m - toe_m;
+}
+
+TEST(ClimbPlanner, DeepTreadBelow_TrailingFootGoesOnToItsLip) {
+  OnATread on;
+  stand_at_lip(on);
+  const ClimbPlanner::Decision decision = on.planner.decide(on.situation, deep_tread_below(on));
+  ASSERT_EQ(decision.goal.kind, StepKind::kLeading);
+  EXPECT_TRUE(decision.trails_to_lip);
+  EXPECT_GT(toe_to_next_lip_m(on, decision.goal.target), 0.06);
+  EXPECT_NEAR(toe_to_next_lip_m(on, decision.trailing.target), on.params.lip.trailing_stand_off_m, 1e-9);
+  EXPECT_EQ(decision.trailing.foothold.position_m, decision.trailing.target.position_m);
+}
+
+TEST(ClimbPlanner, NextLipIsNotSeenOrNearAnyway_TrailsBeside) {
+  OnATread on;
+  stand_at_lip(on);
+  FootholdSet set = deep_tread_below(on);
+  set.has_lip_beyond = false;
+  EXPECT_FALSE(on.planner.decide(on.situation, set).trails_to_lip);
+  set = deep_tread_below(on);
+  set.lip_beyond.nosing_a_m.x() = set.lip_beyond.nosing_b_m.x() = kNextLip_x_m - 0.08;
+  EXPECT_FALSE(on.planner.decide(on.situation, set).trails_to_lip) << "a usual tread";
+  set.lip_beyond.nosing_a_m.x() = set.lip_beyond.nosing_b_m.x() = kNextLip_x_m + 0.2;
+  EXPECT_FALSE(on.planner.decide(on.situation, set).trails_to_lip) << "a landing";
+}
+
+TEST(ClimbPlanner, LegsCannotTrailToTheLip_TrailsBesideFromThenOn) {
+  OnATread on;
+  stand_at_lip(on);
+  const ClimbPlanner::Decision leading = on.planner.decide(on.situation, deep_tread_below(on));
+  ASSERT_TRUE(leading.trails_to_lip);
+  on.planner.latched(on.situation, leading);
+  on.situation.soles[index_of(leading.goal.foot)] = leading.goal.target;
+  on.planner.landed(on.situation.soles);
+  const ClimbPlanner::Decision ahead = on.planner.decide(on.situation, {});
+  EXPECT_NEAR(toe_to_next_lip_m(on, ahead.goal.target), on.params.lip.trailing_stand_off_m, 1e-9);
+
+  EXPECT_TRUE(on.planner.trail_beside());
+  EXPECT_FALSE(on.planner.trail_beside()) << "it does already";
+  const ClimbPlanner::Decision beside = on.planner.decide(on.situation, {});
+  EXPECT_NEAR(beside.goal.target.position_m.x(), leading.goal.target.position_m.x(), 1e-9);
+}
+
+TEST(ClimbPlanner, OneFootAtTheLip_ItCarriesAndTheOtherOneLeads) {
+  for (const Foot rear : {Foot::kLeft, Foot::kRight}) {
+    OnATread on;
+    stand_at_lip(on);
+    on.situation.soles[index_of(rear)].position_m.x() -= 0.09;
+    const ClimbPlanner::Decision decision = on.planner.decide(on.situation, deep_tread_below(on));
+    ASSERT_EQ(decision.goal.kind, StepKind::kLeading);
+    EXPECT_EQ(decision.goal.foot, rear);
+    EXPECT_NEAR(decision.to_lip_m, on.params.lip.stand_off_m, 1e-9);
+  }
+}
+
+TEST(ClimbPlanner, LegsCannotLeadFromTheLip_LinesBothFeetUpThereFirst) {
+  OnATread on;
+  stand_at_lip(on);
+  on.situation.soles[0].position_m.x() -= 0.09;
+  const ClimbPlanner::Decision leading = on.planner.decide(on.situation, deep_tread_below(on));
+  EXPECT_TRUE(on.planner.come_nearer(leading));
+  EXPECT_EQ(on.planner.decide(on.situation, deep_tread_below(on)).goal.kind, StepKind::kFloor);
+  EXPECT_FALSE(on.planner.come_nearer(leading)) << "it does already";
+}
+
 }  // namespace
 }  // namespace polygmap
