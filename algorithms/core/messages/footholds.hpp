@@ -65,6 +65,7 @@ enum class StopReason : std::uint8_t {
   kGroundEnds,       // on the way there no more level ground was seen
   kDropTooDeep,      // the surface below the edge ahead is out of reach: measured_rise_m, negative
   kNoWayUpOrDown,    // it stands below or above where it was told to go, and saw no stairs from there
+  kTooSteep,         // a ramp on the way there: by what it rises over a metre
 };
 
 // One line for each reason, in the enumeration's order: a name for machines, and for people what may follow "the module
@@ -103,8 +104,9 @@ inline constexpr std::array kStopReasonTable{
     StopReasonInfo{"ground_ends", "it saw no more level ground on the way to its goal"},
     StopReasonInfo{"drop_too_deep", "the next surface that it saw was too far down to step on"},
     StopReasonInfo{"no_way_up_or_down", "it stands below or above where it was told to go, and saw no stairs there"},
+    StopReasonInfo{"too_steep", "the ground on the way to its goal sloped too steeply to walk on"},
 };
-static_assert(kStopReasonTable.size() == static_cast<std::size_t>(StopReason::kNoWayUpOrDown) + 1);
+static_assert(kStopReasonTable.size() == static_cast<std::size_t>(StopReason::kTooSteep) + 1);
 
 [[nodiscard]] constexpr std::string_view name_of(StopReason reason) noexcept {
   const auto i = static_cast<std::size_t>(reason);

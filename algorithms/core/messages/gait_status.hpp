@@ -46,7 +46,7 @@ struct GaitStatus {
   std::int64_t stamp_ns = 0;
   GaitPhase phase = GaitPhase::kStandstill;
   StopReason stop_reason = StopReason::kNone;
-  double stop_measured_m = 0.0;                     // the rise or tread behind stop_reason
+  double stop_measured_m = 0.0;                     // the rise, tread or slope behind stop_reason
   LatchedStep step;                                 // the current or the last swing
   std::uint32_t treads_climbed = 0;                 // both feet on it, by the module's own count
   std::array<bool, kFootCount> stands{true, true};  // planned contact

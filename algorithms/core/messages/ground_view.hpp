@@ -20,7 +20,9 @@ struct GroundView {
   double height_m = 0.0;         // of the standing soles, as they stood for it
   // Ground at the height of the standing soles was seen there, or a sole has stood there, and no mapped slope is near.
   Rows level{};
-  Rows tall{};  // something rises there
+  Rows tall{};            // something rises there
+  Rows ramps{};           // a mapped surface that is too steep to walk on, and longer than any tread, is there
+  double steepest = 0.0;  // of these: by what it rises over a metre
 
   [[nodiscard]] static std::int32_t cell_of(double along_m) noexcept {
     return static_cast<std::int32_t>(std::floor(along_m / kCell_m));

@@ -351,6 +351,7 @@ bool ClimbPlanner::leads_to_goal(const Situation& situation, const FootholdSet& 
   const Vec2 heading = unit_at(footholds.p_star_feet[0].yaw_rad);
   const Vec2 nosing_m = 0.5 * (footholds.tread.nosing_a_m + footholds.tread.nosing_b_m).head<2>();
   const Vec2 way_m = goal_.laid_out->odom_p_m - middle_of(situation.soles).position_m.head<2>();
+  if (is_over_ramp(situation, footholds)) return false;
   // Amid a flight there is no other way than on: the landing behind it may lead back, aside, or over a rise to where it
   // came from. Not past the goal's height, and not back.
   constexpr double kOnTread_m = 0.40, kReach_m = 0.60;
@@ -365,6 +366,14 @@ bool ClimbPlanner::leads_to_goal(const Situation& situation, const FootholdSet& 
   if (const auto by_rise = goal.is_by_rise(z_m, footholds.measured_rise_m)) return *by_rise;
   return heading.dot(goal_.laid_out->odom_p_m - nosing_m) > params_.walk.stairs_beyond_m &&
          heading.dot(way_m) > math::cos(params_.walk.stairs_aside_rad) * way_m.norm();
+}
+
+// What the search offers is a ramp, or begins behind one: no steps lead over it.
+bool ClimbPlanner::is_over_ramp(const Situation& situation, const FootholdSet& footholds) const noexcept {
+  const Vec2 nosing_m = 0.5 * (footholds.tread.nosing_a_m + footholds.tread.nosing_b_m).head<2>();
+  return usable(footholds.p_star_feet) && math::all_finite(footholds.tread.nosing_a_m) &&
+         math::all_finite(footholds.tread.nosing_b_m) &&
+         LevelWalk::ramp_on_way(footholds.ground, middle_of(situation.soles).position_m.head<2>(), nosing_m) > 0.0;
 }
 
 ClimbPlanner::Decision ClimbPlanner::walk(const Situation& situation, const FootholdSet& footholds) const noexcept {
@@ -402,6 +411,13 @@ ClimbPlanner::Decision ClimbPlanner::walk(const Situation& situation, const Foot
     decision.measured_m = way_.gave_up_for()->measured_m;
     return decision;
   }
+  const double ramp =
+      LevelWalk::ramp_on_way(footholds.ground, middle_of(situation.soles).position_m.head<2>(), to->odom_p_m);
+  if (step.outcome == LevelStep::Outcome::kNoGround && ramp > 0.0) {
+    decision.obstruction = StopReason::kTooSteep;
+    decision.measured_m = ramp;
+    return decision;
+  }
   // What the search says of what comes next is the better reason, where it says anything.
   decision.measured_m = measured(footholds);
   decision.obstruction = footholds.obstruction;
@@ -416,7 +432,8 @@ ClimbPlanner::Decision ClimbPlanner::look_and_decide(const Situation& situation,
                                                      const FootholdSet& footholds) noexcept {
   if (!goal_.laid_out || split_stance_) return decide(situation, footholds);
   const bool climbs = leads_to_goal(situation, footholds), lines_up = floor_.steps > 0;
-  const GoalWay::Input in{situation.soles, footholds, *goal_.laid_out, climbs, lines_up, on_treads_};
+  const GoalWay::Input in{
+      situation.soles, footholds, *goal_.laid_out, climbs, lines_up, on_treads_, is_over_ramp(situation, footholds)};
   way_.watch(params_.way, in);
   const Decision decision = decide(situation, footholds);
   if (decision.walk) way_.walked(params_.way, in, *decision.walk, {decision.obstruction, decision.measured_m});

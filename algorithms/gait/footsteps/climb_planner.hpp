@@ -232,6 +232,7 @@ class ClimbPlanner {
 
  private:
   [[nodiscard]] bool leads_to_goal(const Situation& situation, const FootholdSet& footholds) const noexcept;
+  [[nodiscard]] bool is_over_ramp(const Situation& situation, const FootholdSet& footholds) const noexcept;
   [[nodiscard]] Decision walk(const Situation& situation, const FootholdSet& footholds) const noexcept;
   [[nodiscard]] Decision trailing_step(const Situation& situation, const FootholdSet& footholds) const noexcept;
   // Down: the foot that trails goes on ahead of the other one on its tread, to the lip where that ends. There it

@@ -73,7 +73,8 @@ void GoalWay::seek_vantage(const GoalWayParams& params, const Input& in) noexcep
                                 std::abs(math::wrap_angle(look_.from->yaw_rad - middle.yaw_rad)) < params.looked_rad);
   }
   const std::optional<Stairs> stairs = stairs_in(in.footholds);
-  if (!stairs || !may_be_told_better(in.footholds.obstruction) || look_.count >= params.most_looks) return;
+  if (!stairs || in.is_over_ramp || !may_be_told_better(in.footholds.obstruction) || look_.count >= params.most_looks)
+    return;
   const Vec2 heading = unit_at(stairs->yaw_rad);
   const Vec2 way_m = stairs->nosing_m - middle.position_m.head<2>();
   const bool offers = in.footholds.has_p_star && in.footholds.obstruction == StopReason::kNone;

@@ -72,6 +72,7 @@ class GoalWay {
     bool climbs = false;    // stairs that it sees lead to the goal
     bool lines_up = false;  // with them: it has stood before them
     bool on_tread = false;
+    bool is_over_ramp = false;  // these stairs are behind or of one that is too steep to walk on
   };
 
   // Why it came no further, and the rise, drop or tread behind it.

@@ -39,6 +39,22 @@ bool LevelWalk::carries(const GroundView& ground, const OrientedRectangle& sole)
   return true;
 }
 
+double LevelWalk::ramp_on_way(const GroundView& ground, const Vec2& from_m, const Vec2& to_m) noexcept {
+  constexpr double kFar_m = 0.8, kAside_m = 0.1;
+  if (!(ground.steepest > 0.0)) return 0.0;
+  const double way_m = (to_m - from_m).norm();
+  const Vec2 ahead = way_m > 0.0 ? Vec2{(to_m - from_m) / way_m} : Vec2::Zero();
+  const auto squares = static_cast<std::int32_t>(std::ceil(std::min(way_m, kFar_m) / GroundView::kCell_m));
+  for (std::int32_t i = 0; i <= squares; ++i) {
+    for (const double aside_m : {-kAside_m, 0.0, kAside_m}) {
+      const Vec2 at_m = from_m + i * GroundView::kCell_m * ahead + aside_m * left_of(ahead) - ground.corner_m;
+      if (GroundView::has(ground.ramps, GroundView::cell_of(at_m.x()), GroundView::cell_of(at_m.y())))
+        return ground.steepest;
+    }
+  }
+  return 0.0;
+}
+
 double LevelWalk::clearance_m(const GroundView& ground, const Vec2& odom_p_m, double most_m) noexcept {
   const Vec2 at_m = odom_p_m - ground.corner_m;
   double least2_m2 = math::square(most_m);

@@ -87,6 +87,9 @@ class LevelWalk {
   [[nodiscard]] bool has_arrived(const SolePair& soles, const WalkGoal& goal) const noexcept;
   // Ground was seen under all of the sole.
   [[nodiscard]] static bool carries(const GroundView& ground, const OrientedRectangle& sole) noexcept;
+  // By what the steepest ramp rises over a metre, where one is on the straight way, as far as a few steps lead; 0:
+  // none.
+  [[nodiscard]] static double ramp_on_way(const GroundView& ground, const Vec2& from_m, const Vec2& to_m) noexcept;
   // To the nearest square that rises; most_m where there is none as near.
   [[nodiscard]] static double clearance_m(const GroundView& ground, const Vec2& odom_p_m, double most_m) noexcept;
 

@@ -149,6 +149,7 @@ bool GroundMap::tell(GroundView& out) noexcept {
   if (row_ < GroundView::kSide_cells) {
     out.corner_m = Vec2{first_x_, first_y_} * GroundView::kCell_m;
     out.height_m = 1e-3 * height_mm_;
+    out.steepest = 0.0;
     tell_row(out);
     ++row_;
     return false;
@@ -178,14 +179,21 @@ void GroundMap::leave_out(const Transform& map_T_local, const ConvexPolygon& loc
     lowest_m = std::min(lowest_m, corner(i).z());
     highest_m = std::max(highest_m, corner(i).z());
   }
+  const Vec3 up = map_T_local.R.col(2);
+  const Vec2 slope = -up.head<2>() / up.z();
+  const double rise = slope.norm();
   work_.add(local.size(), 30);
   if (lowest_m > kStorey_m || highest_m < -kStorey_m) return;
+  // Near a crease pictures tell it from the ground before it late: it begins where the planes meet.
+  constexpr double kMostBefore_m = 0.4;
+  const double off_m = std::max(lowest_m, 0.0) + std::min(highest_m, 0.0);
+  const Vec2 before_m =
+      rise > 0.0 ? Vec2{-math::clamp(off_m / rise, -kMostBefore_m, kMostBefore_m) / rise * slope} : Vec2::Zero();
   std::array<double, GroundView::kSide_cells> first_m{}, last_m{};  // of a row's middle line
   first_m.fill(kFar_m);
   last_m.fill(-kFar_m);
   work_.add(2 * GroundView::kSide_cells, 30);
-  for (std::size_t i = 0; i < local.size(); ++i) {
-    const Vec2 a_m = corner(i).head<2>(), b_m = corner(i + 1).head<2>();
+  const auto take_edge = [&](const Vec2& a_m, const Vec2& b_m) {
     const double low_m = std::min(a_m.y(), b_m.y()), high_m = std::max(a_m.y(), b_m.y());
     const std::int32_t last = std::min(GroundView::cell_of(high_m), GroundView::kSide_cells - 1);
     work_.add(100);
@@ -198,8 +206,17 @@ void GroundMap::leave_out(const Transform& map_T_local, const ConvexPolygon& loc
       last_m[row] = std::max(last_m[row], x_m);
       work_.add(20);
     }
+  };
+  for (std::size_t i = 0; i < local.size(); ++i) {
+    const Vec2 a_m = corner(i).head<2>(), b_m = corner(i + 1).head<2>();
+    take_edge(a_m, b_m);
+    take_edge(a_m + before_m, b_m + before_m);
+    take_edge(a_m, a_m + before_m);
   }
-  constexpr std::int32_t kAbout = 2;  // squares: it begins before what was seen of it
+  constexpr std::int32_t kAbout = 2;        // squares: where the planes meet is known so well
+  constexpr double kLongestTread_m = 0.60;  // treads may be built askew
+  const bool is_ramp = highest_m - lowest_m > kLongestTread_m * rise;
+  if (is_ramp) out.steepest = std::max(out.steepest, rise);
   for (std::int32_t y = 0; y < GroundView::kSide_cells; ++y) {
     const auto from = static_cast<std::size_t>(y);
     if (first_m[from] > last_m[from]) continue;
@@ -208,6 +225,7 @@ void GroundMap::leave_out(const Transform& map_T_local, const ConvexPolygon& loc
     const std::int32_t last = std::min(y + kAbout, GroundView::kSide_cells - 1);
     for (std::int32_t row = std::max(y - kAbout, 0); row <= last; ++row) {
       out.level[static_cast<std::size_t>(row)] &= ~bits;
+      if (is_ramp) out.ramps[static_cast<std::size_t>(row)] |= bits;
     }
   }
 }
@@ -232,6 +250,7 @@ void GroundMap::tell_row(GroundView& out) noexcept {
   const auto row = static_cast<std::size_t>(row_);
   out.level[row] = level;
   out.tall[row] = tall;
+  out.ramps[row] = 0;
   lower_[row] = lower;
   higher_[row] = higher;
 }

@@ -61,8 +61,9 @@ class GroundMap {
   void begin(const View& view) noexcept;
   [[nodiscard]] bool look() noexcept;
   [[nodiscard]] bool tell(GroundView& out) noexcept;
-  // What lies within the outline, x and y of its own frame, or two squares about it, is not level, where some of it is
-  // about as high as the standing soles. An outline that lies between the middle lines of two rows is missed.
+  // What lies within the outline, x and y of its own frame, between it and where its plane comes to the height of the
+  // standing soles, or two squares about that, is not level, where some of it is about as high as they are. An outline
+  // that lies between the middle lines of two rows is missed.
   [[gnu::cold, gnu::noinline]] void leave_out(const Transform& map_T_local, const ConvexPolygon& local,
                                               GroundView& out) noexcept;
   [[nodiscard]] WorkCount& work() noexcept { return work_; }  // since it was last paid

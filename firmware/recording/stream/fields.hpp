@@ -243,6 +243,8 @@ void each_field(auto& f, Of<GroundView> auto& m) {
   walk(f, "height_m", m.height_m);
   walk(f, "level", m.level);
   walk(f, "tall", m.tall);
+  walk(f, "ramps", m.ramps);
+  walk(f, "steepest", m.steepest);
 }
 void each_field(auto& f, Of<FootholdSet> auto& m) {
   walk(f, "map_stamp_ns", m.map_stamp_ns);

@@ -13,9 +13,10 @@ std::string sentence(const char* format, double a = 0.0, double b = 0.0, double 
   return buffer;
 }
 
-// With the rise, drop or tread that was measured, where one is behind the reason.
+// With the rise, drop, tread or slope that was measured, where one is behind the reason.
 std::string why_stopped(StopReason reason, double measured_m) {
   const std::string why(text_of(reason));
+  if (reason == StopReason::kTooSteep) return why + sentence(" (%.1f degrees)", std::atan(measured_m) * 180.0 / kPi);
   const bool of_a_length = reason == StopReason::kRiseTooHigh || reason == StopReason::kDropTooDeep ||
                            reason == StopReason::kTreadTooShort || reason == StopReason::kLegsCannot;
   return of_a_length && measured_m > 0.0 ? why + sentence(" (%.3f m)", measured_m) : why;

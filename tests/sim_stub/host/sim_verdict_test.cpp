@@ -62,6 +62,17 @@ TEST(ClimbVerdict, StoppedBeforeADrop_NamesItsDepth) {
   EXPECT_EQ(climb.finish().stop_sentence, "the next surface that it saw was too far down to step on (0.451 m)");
 }
 
+TEST(ClimbVerdict, StoppedBeforeARamp_NamesItsAngle) {
+  ScriptedClimb climb(plain_stairs(2));
+  climb.wait(100 * kNsPerMs);
+  climb.gait.phase = GaitPhase::kStopped;
+  climb.gait.stop_reason = StopReason::kTooSteep;
+  climb.gait.stop_measured_m = std::tan(9.0 * kPi / 180.0);
+  climb.tick();
+  EXPECT_EQ(climb.finish().stop_sentence,
+            "the ground on the way to its goal sloped too steeply to walk on (9.0 degrees)");
+}
+
 // It has ended by itself, 2 m from the world's goal.
 std::string reason_where_it_ended(const std::vector<TimedRequest>& asked, ClimbOperator* climb_operator) {
   ClimbSummary s;

@@ -350,5 +350,24 @@ TEST(ClimbPlanner, LegsCannotLeadFromTheLip_LinesBothFeetUpThereFirst) {
   EXPECT_FALSE(on.planner.come_nearer(leading)) << "it does already";
 }
 
+// A ramp is a surface that rises, and so is the landing behind it.
+TEST(ClimbPlanner, TreadBehindARamp_IsNotClimbedAndTheRampIsTheReason) {
+  OnATread on;
+  on.planner.go_to({.ahead_m = 3.0});
+  on.planner.lay_out_destination(on.situation.soles);
+  FootholdSet next = next_tread(on);
+  EXPECT_EQ(on.planner.look_and_decide(on.situation, next).goal.kind, StepKind::kLeading);
+  next.ground.level = {};
+  next.ground.ramps.fill(~std::uint64_t{0});
+  next.ground.steepest = 0.1;
+  ClimbPlanner::Decision decision = on.planner.look_and_decide(on.situation, next);
+  EXPECT_TRUE(decision.walks);
+  for (int i = 0; i < 5 && decision.obstruction == StopReason::kNone; ++i)
+    decision = on.planner.look_and_decide(on.situation, next);
+  EXPECT_FALSE(decision.has_step);
+  EXPECT_EQ(decision.obstruction, StopReason::kTooSteep);
+  EXPECT_EQ(decision.measured_m, 0.1);
+}
+
 }  // namespace
 }  // namespace polygmap

@@ -157,5 +157,16 @@ TEST_F(LevelWalkTest, GroundNeverSeen_TakesNoStep) {
   EXPECT_EQ(next({{1.0, 0.0}, 0.0, false}).outcome, Outcome::kNoGround);
 }
 
+TEST_F(LevelWalkTest, RampOnTheWay_IsToldOfAndNoneAside) {
+  ground_.steepest = 0.2;
+  const auto column = static_cast<std::uint32_t>(GroundView::cell_of(0.5 - ground_.corner_m.x()));
+  ground_.ramps.fill(~std::uint64_t{0} << column);
+  EXPECT_EQ(LevelWalk::ramp_on_way(ground_, {0.0, 0.0}, {2.0, 0.0}), 0.2);
+  EXPECT_EQ(LevelWalk::ramp_on_way(ground_, {0.0, 0.0}, {0.3, 0.0}), 0.0) << "it begins behind";
+  EXPECT_EQ(LevelWalk::ramp_on_way(ground_, {0.0, 0.0}, {0.0, 2.0}), 0.0);
+  ground_.ramps = {};
+  EXPECT_EQ(LevelWalk::ramp_on_way(ground_, {0.0, 0.0}, {2.0, 0.0}), 0.0);
+}
+
 }  // namespace
 }  // namespace polygmap

@@ -51,7 +51,7 @@ TEST_F(PictureMonitorTest, Take_WholePictures_AreGoodAndExplainNothing) {
   show(60, nothing);
   EXPECT_LT(monitor_.missing_share(), 0.02);
   EXPECT_FALSE(monitor_.is_bad());
-  for (int i = 0; i <= static_cast<int>(StopReason::kNoWayUpOrDown); ++i) {
+  for (int i = 0; i <= static_cast<int>(StopReason::kTooSteep); ++i) {
     const auto found = static_cast<StopReason>(i);
     EXPECT_EQ(monitor_.explain(found, true), found);
   }

@@ -87,6 +87,49 @@ TEST_F(GroundMapTest, RampSeenAmidTheFloor_IsLeftOutWithTwoSquaresAboutIt) {
   EXPECT_EQ(told_.level, before.level) << "on the storey below";
 }
 
+// A ramp of 5 degrees about x = 0.6 m that rises ahead, of so great a length, and its nearer end so high.
+GroundView with_ramp(GroundMap& map, GroundView told, double length_m, double near_end_m) {
+  const double slope_rad = 5.0 * kPi / 180.0;
+  ConvexPolygon outline;
+  for (const auto& [x, y] : {std::pair{0.0, -0.3}, {length_m, -0.3}, {length_m, 0.3}, {0.0, 0.3}})
+    static_cast<void>(outline.try_push_back({x, y}));
+  map.leave_out({rotation_y(-slope_rad), Vec3{0.6, 0.0, near_end_m}}, outline, told);
+  return told;
+}
+
+TEST_F(GroundMapTest, RampWhoseOutlineBeginsLate_IsLeftOutFromWhereItsPlaneMeetsTheGround) {
+  look([](double, double) { return 0.0; }, 40);
+  const GroundView told = with_ramp(*map_, told_, 1.0, 0.02);  // its plane meets the ground at 0.37 m
+  EXPECT_FALSE(is(told.level, 0.40, 0.0));
+  EXPECT_TRUE(is(told.level, 0.25, 0.0));
+  EXPECT_TRUE(is(told.ramps, 0.40, 0.0));
+  EXPECT_NEAR(told.steepest, std::tan(5.0 * kPi / 180.0), 1e-9);
+}
+
+TEST_F(GroundMapTest, RampThatFallsAway_IsLeftOutFromWhereItsPlaneMeetsTheGround) {
+  look([](double, double) { return 0.0; }, 40);
+  const double slope_rad = -5.0 * kPi / 180.0;
+  ConvexPolygon outline;
+  for (const auto& [x, y] : {std::pair{0.0, -0.3}, {1.0, -0.3}, {1.0, 0.3}, {0.0, 0.3}})
+    static_cast<void>(outline.try_push_back({x, y}));
+  map_->leave_out({rotation_y(-slope_rad), Vec3{0.6, 0.0, -0.02}}, outline, told_);
+  EXPECT_FALSE(is(told_.level, 0.40, 0.0));
+  EXPECT_TRUE(is(told_.level, 0.25, 0.0));
+}
+
+TEST_F(GroundMapTest, TreadBuiltAskew_IsNoLevelGroundAndNoRamp) {
+  look([](double, double) { return 0.0; }, 40);
+  const GroundView told = with_ramp(*map_, told_, 0.4, 0.0);
+  EXPECT_FALSE(is(told.level, 0.7, 0.0));
+  EXPECT_FALSE(is(told.ramps, 0.7, 0.0));
+  EXPECT_EQ(told.steepest, 0.0);
+}
+
+TEST_F(GroundMapTest, RampOfAnotherStorey_LeavesNothingOut) {
+  look([](double, double) { return 0.0; }, 40);
+  EXPECT_EQ(with_ramp(*map_, told_, 1.0, 0.5).level, told_.level);
+}
+
 // A polygon around it would be convex.
 TEST_F(GroundMapTest, HoleInTheFloor_IsNoGround) {
   const auto in_hole = [](double x, double y) { return x > 0.6 && x < 0.9 && std::abs(y) < 0.15; };
