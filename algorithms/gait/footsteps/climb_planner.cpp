@@ -351,7 +351,7 @@ bool ClimbPlanner::leads_to_goal(const Situation& situation, const FootholdSet& 
   const Vec2 heading = unit_at(footholds.p_star_feet[0].yaw_rad);
   const Vec2 nosing_m = 0.5 * (footholds.tread.nosing_a_m + footholds.tread.nosing_b_m).head<2>();
   const Vec2 way_m = goal_.laid_out->odom_p_m - middle_of(situation.soles).position_m.head<2>();
-  if (is_over_ramp(situation, footholds)) return false;
+  if (saw_lately(memory_.stairs_over_ramp_ns, situation)) return false;
   // Amid a flight there is no other way than on: the landing behind it may lead back, aside, or over a rise to where it
   // came from. Not past the goal's height, and not back.
   constexpr double kOnTread_m = 0.40, kReach_m = 0.60;
@@ -374,6 +374,23 @@ bool ClimbPlanner::is_over_ramp(const Situation& situation, const FootholdSet& f
   return usable(footholds.p_star_feet) && math::all_finite(footholds.tread.nosing_a_m) &&
          math::all_finite(footholds.tread.nosing_b_m) &&
          LevelWalk::ramp_on_way(footholds.ground, middle_of(situation.soles).position_m.head<2>(), nosing_m) > 0.0;
+}
+
+void ClimbPlanner::look_for_ramps(const Situation& situation, const FootholdSet& footholds) noexcept {
+  const WalkGoal to = way_.next(*goal_.laid_out).value_or(*goal_.laid_out);
+  const double ramp =
+      LevelWalk::ramp_on_way(footholds.ground, middle_of(situation.soles).position_m.head<2>(), to.odom_p_m);
+  if (ramp > 0.0) {
+    memory_.ramp = ramp;
+    memory_.ramp_ns = situation.stamp_ns;
+  }
+  if (is_over_ramp(situation, footholds)) memory_.stairs_over_ramp_ns = situation.stamp_ns;
+}
+
+// The map has it in some pictures and not in others.
+bool ClimbPlanner::saw_lately(const std::optional<std::int64_t>& stamp_ns, const Situation& situation) const noexcept {
+  constexpr std::int64_t kLately_ns = 1'500'000'000;  // no longer than a step takes: then it may look elsewhere
+  return stamp_ns && situation.stamp_ns - *stamp_ns < kLately_ns;
 }
 
 ClimbPlanner::Decision ClimbPlanner::walk(const Situation& situation, const FootholdSet& footholds) const noexcept {
@@ -411,11 +428,9 @@ ClimbPlanner::Decision ClimbPlanner::walk(const Situation& situation, const Foot
     decision.measured_m = way_.gave_up_for()->measured_m;
     return decision;
   }
-  const double ramp =
-      LevelWalk::ramp_on_way(footholds.ground, middle_of(situation.soles).position_m.head<2>(), to->odom_p_m);
-  if (step.outcome == LevelStep::Outcome::kNoGround && ramp > 0.0) {
+  if (step.outcome == LevelStep::Outcome::kNoGround && saw_lately(memory_.ramp_ns, situation)) {
     decision.obstruction = StopReason::kTooSteep;
-    decision.measured_m = ramp;
+    decision.measured_m = memory_.ramp;
     return decision;
   }
   // What the search says of what comes next is the better reason, where it says anything.
@@ -431,9 +446,15 @@ ClimbPlanner::Decision ClimbPlanner::walk(const Situation& situation, const Foot
 ClimbPlanner::Decision ClimbPlanner::look_and_decide(const Situation& situation,
                                                      const FootholdSet& footholds) noexcept {
   if (!goal_.laid_out || split_stance_) return decide(situation, footholds);
+  look_for_ramps(situation, footholds);
   const bool climbs = leads_to_goal(situation, footholds), lines_up = floor_.steps > 0;
-  const GoalWay::Input in{
-      situation.soles, footholds, *goal_.laid_out, climbs, lines_up, on_treads_, is_over_ramp(situation, footholds)};
+  const GoalWay::Input in{situation.soles,
+                          footholds,
+                          *goal_.laid_out,
+                          climbs,
+                          lines_up,
+                          on_treads_,
+                          saw_lately(memory_.stairs_over_ramp_ns, situation)};
   way_.watch(params_.way, in);
   const Decision decision = decide(situation, footholds);
   if (decision.walk) way_.walked(params_.way, in, *decision.walk, {decision.obstruction, decision.measured_m});

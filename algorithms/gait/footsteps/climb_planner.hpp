@@ -233,6 +233,8 @@ class ClimbPlanner {
  private:
   [[nodiscard]] bool leads_to_goal(const Situation& situation, const FootholdSet& footholds) const noexcept;
   [[nodiscard]] bool is_over_ramp(const Situation& situation, const FootholdSet& footholds) const noexcept;
+  void look_for_ramps(const Situation& situation, const FootholdSet& footholds) noexcept;
+  [[nodiscard]] bool saw_lately(const std::optional<std::int64_t>& stamp_ns, const Situation& situation) const noexcept;
   [[nodiscard]] Decision walk(const Situation& situation, const FootholdSet& footholds) const noexcept;
   [[nodiscard]] Decision trailing_step(const Situation& situation, const FootholdSet& footholds) const noexcept;
   // Down: the foot that trails goes on ahead of the other one on its tread, to the lip where that ends. There it
@@ -267,8 +269,10 @@ class ClimbPlanner {
     std::int32_t swings_in_a_row = 1;  // of that foot
     Foot leading = Foot::kLeft;
     bool has_leading = false;
-    bool led_down = false;       // the step that led last
-    bool trails_to_lip = false;  // so does its trailing foothold
+    bool led_down = false;                                     // the step that led last
+    bool trails_to_lip = false;                                // so does its trailing foothold
+    double ramp = 0.0;                                         // that was on its way: by what it rises over a metre
+    std::optional<std::int64_t> ramp_ns, stairs_over_ramp_ns;  // when it saw it, and stairs of or behind one
   } memory_, before_latch_;
   struct {
     std::optional<Destination> asked;
