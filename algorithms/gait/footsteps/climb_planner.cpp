@@ -75,15 +75,15 @@ void ClimbPlanner::reset(const Params& params, const RobotModel& robot) noexcept
   std::construct_at(this);  // in place: another one would take kilobytes of stack
   params_ = params;
   robot_ = &robot;
-  reach_over_lip_m_ = params.lip.far_m;
+  over_lip_.reach_m = params.lip.far_m;
 }
 
 void ClimbPlanner::restart() noexcept {
   floor_.stride_share = 1.0;
   floor_.steps = floor_.corrections = 0;
   way_.forget();
-  passing_refused_ = closes_up_ = trails_beside_ = false;
-  reach_over_lip_m_ = params_.lip.far_m;
+  passing_refused_ = closes_up_ = over_lip_.trails_beside = false;
+  over_lip_.reach_m = params_.lip.far_m;
   odom_stood_.reset();
   slid_.reset();
   set_back_ = 0;
@@ -96,7 +96,7 @@ ClimbPlanner::Decision ClimbPlanner::trailing_step(const Situation& situation,
   StepGoal& goal = decision.goal;
   goal.kind = StepKind::kTrailing;
   goal.foot = other(memory_.leading);
-  if (memory_.trails_to_lip && trails_beside_) {
+  if (memory_.trails_to_lip && over_lip_.trails_beside) {
     goal.foothold = memory_.trailing_foothold;
     goal.target = sole_beside_on_tread(situation.soles[index_of(memory_.leading)], goal.foot, landed_,
                                        robot_->stance.half_width_m);
@@ -124,7 +124,7 @@ ClimbPlanner::Decision ClimbPlanner::trailing_step(const Situation& situation,
 
 bool ClimbPlanner::trail_to_lip(const FootholdSet& footholds, const SolePose& leading,
                                 StepGoal& trailing) const noexcept {
-  if (trails_beside_ || !footholds.has_lip_beyond) return false;
+  if (over_lip_.trails_beside || !footholds.has_lip_beyond) return false;
   const Nosing lip{footholds.lip_beyond.nosing_a_m, footholds.lip_beyond.nosing_b_m};
   const Vec2 along = (lip.odom_p_b - lip.odom_p_a).head<2>();
   if (!(along.norm() > 0.0)) return false;
@@ -299,12 +299,12 @@ StepGoal ClimbPlanner::closing_goal(const Situation& situation, const FootholdSe
 }
 
 bool ClimbPlanner::come_nearer(const Decision& leading) noexcept {
-  if (!on_treads_ || leading.to_lip_m <= 0.0 || reach_over_lip_m_ == 0.0) return false;
-  reach_over_lip_m_ = leading.to_lip_m > params_.lip.near_m ? params_.lip.near_m : 0.0;
+  if (!on_treads_ || leading.to_lip_m <= 0.0 || over_lip_.reach_m == 0.0) return false;
+  over_lip_.reach_m = leading.to_lip_m > params_.lip.near_m ? params_.lip.near_m : 0.0;
   return true;
 }
 
-bool ClimbPlanner::trail_beside() noexcept { return !std::exchange(trails_beside_, true); }
+bool ClimbPlanner::trail_beside() noexcept { return !std::exchange(over_lip_.trails_beside, true); }
 
 bool ClimbPlanner::close_up(const Situation& situation) noexcept {
   const double apart_m = (situation.soles[0].position_m - situation.soles[1].position_m).norm();
@@ -496,7 +496,7 @@ ClimbPlanner::Decision ClimbPlanner::decide(const Situation& situation, const Fo
   }
   const Foot trail = other(lead);
   decision.to_lip_m = to_lip[index_of(trail)];
-  const bool lines_up = !on_treads_ || decision.to_lip_m > reach_over_lip_m_;
+  const bool lines_up = !on_treads_ || decision.to_lip_m > over_lip_.reach_m;
   if (lines_up && floor_goal(situation, footholds, decision.goal)) {
     decision.has_step = floor_.corrections < params_.line_up.max_corrections && floor_.steps < params_.max_floor_steps;
     if (decision.has_step) return decision;
@@ -580,7 +580,7 @@ void ClimbPlanner::landed(const std::optional<SolePair>& soles) noexcept {
       break;
     case StepKind::kTrailing:
       split_stance_ = passing_refused_ = false;
-      if (reach_over_lip_m_ == 0.0) reach_over_lip_m_ = params_.lip.near_m;
+      if (over_lip_.reach_m == 0.0) over_lip_.reach_m = params_.lip.near_m;
       ++treads_climbed_;
       break;
   }

@@ -275,6 +275,10 @@ class ClimbPlanner {
     std::optional<std::int64_t> ramp_ns, stairs_over_ramp_ns;  // when it saw it, and stairs of or behind one
   } memory_, before_latch_;
   struct {
+    double reach_m = 0.0;        // from so far off the legs have not refused to lead down yet
+    bool trails_beside = false;  // they refused to trail to the next lip
+  } over_lip_;
+  struct {
     std::optional<Destination> asked;
     std::optional<WalkGoal> laid_out;
   } goal_;
@@ -284,8 +288,6 @@ class ClimbPlanner {
   bool split_stance_ = false;  // the leading foot stands on a tread, the other one below: the trailing step ends this
   bool passing_refused_ = false;
   bool closes_up_ = false;
-  bool trails_beside_ = false;          // the legs refused to trail to a lip
-  double reach_over_lip_m_ = 0.0;       // from so far off the legs have not refused to go down yet
   SolePose landed_;                     // where the foot that landed last was to
   std::optional<SolePair> odom_stood_;  // both soles when it landed
   std::optional<Foot> slid_;            // since then, and is to be set back

@@ -210,14 +210,15 @@ void PolygonMap::begin_ground() noexcept {
   stage_ = Stage::kGround;
 }
 
-// The next one, if there is any. What is steeper than a ramp is none that anybody would stand on.
+// The next one, if there is any. What is steeper than a ramp is none that anybody would stand on. Two sightings tell
+// it, not as many as a tread needs: waiting for those, soles were set on ramps that were about to be told (2026-12-01).
 void PolygonMap::leave_out_slope() noexcept {
   constexpr double kSteepest = 0.7;
   const double level = math::cos(params_.level_rad);
   const auto from = tracks_.begin() + static_cast<std::ptrdiff_t>(pass_.track);
   const auto next = std::find_if(from, tracks_.end(), [&](const MapTrack& track) {
     const double up = track.map_T_local.R(2, 2);
-    return up > kSteepest && up < level && track.sightings >= params_.memory.confirmed_sightings && !track.erased;
+    return up > kSteepest && up < level && track.sightings > 1 && !track.erased;
   });
   work_.add(static_cast<std::size_t>(next - from), 10);
   if (next == tracks_.end()) {
