@@ -24,6 +24,13 @@ FootholdSet moved(FootholdSet set, const Vec3& by_m, const FootholdSearch::Query
   }
   set.ground.corner_m += by_m.head<2>();
   set.ground.height_m += by_m.z();
+  // The lip as the feet, which are told to go there.
+  const Vec2 heading = unit_at(set.p_star_feet[0].yaw_rad);
+  for (Vec3* end : {&set.lip_beyond.nosing_a_m, &set.lip_beyond.nosing_b_m}) {
+    const double way_m = base((*end - by_m).head<2>()).x() + seen_behind_m;
+    const double ahead_m = 0.5 * (query.feet_ahead_m[0] + query.feet_ahead_m[1]) + query.way_excess * way_m;
+    end->head<2>() -= ahead_m * heading;
+  }
   for (std::size_t f = 0; f < kFootCount; ++f) {
     for (Foothold* foot : {&set.p_star_feet[f], &set.p_star_star_feet[f]}) {
       const double way_m = base(foot->position_m.head<2>()).x() + seen_behind_m;

@@ -85,7 +85,8 @@ StopReason FootholdSearch::judge_below(const Lip& lip, std::size_t level) noexce
   pending_.measured_rise_m = tread.height_m - z_foot_;
   pending_.measured_tread_m = tread.depth_m;
   pending_.tread = {over.left_m, over.right_m};
-  pending_.has_lip_beyond = tread.ends.lip.has_value();
+  constexpr double kVague_m = 0.016;  // a toe stands 20 mm before it
+  pending_.has_lip_beyond = tread.ends.lip && tread.back_margin_m <= kVague_m;
   if (tread.ends.lip) pending_.lip_beyond = {tread.ends.lip->left_m, tread.ends.lip->right_m};
   if (-pending_.measured_rise_m > params_.down.drop_max_m) return StopReason::kDropTooDeep;
   const double step_max_m = query_.climbing ? params_.step_max_m : std::numeric_limits<double>::infinity();

@@ -325,7 +325,7 @@ typedef struct polygmap_status {
   int64_t stamp_ns;         // of the last cycle; 0 before the first
   int32_t phase;            // polygmap_phase
   int32_t stop_reason;      // 0: none
-  double stop_measured_m;   // the rise or tread behind stop_reason; 0: none
+  double stop_measured_m;   // the rise or tread behind stop_reason, of too_steep what it rises over a metre; 0: none
   uint32_t treads_climbed;  // both feet on it, by the module's own count
   polygmap_arming arming;
   polygmap_drives drives;

@@ -134,7 +134,7 @@ struct FootholdSet {
   std::array<Foothold, kFootCount> p_star_feet;
   std::array<Foothold, kFootCount> p_star_star_feet;  // p** likewise, on the tread after p*'s
   TreadView tread;                                    // of p*
-  TreadView lip_beyond;                               // down, where has_lip_beyond: p*'s tread drops away there
+  TreadView lip_beyond;  // down, where has_lip_beyond: p*'s tread drops away there; back as p_star_feet are
   bool has_lip_beyond = false;
   StopReason obstruction = StopReason::kNothingSeen;
   StopReason unsteady = StopReason::kUnsteady;  // why, where what is offered keeps changing

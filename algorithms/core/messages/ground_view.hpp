@@ -22,7 +22,7 @@ struct GroundView {
   Rows level{};
   Rows tall{};            // something rises there
   Rows ramps{};           // a mapped surface that is too steep to walk on, and longer than any tread, is there
-  double steepest = 0.0;  // of these: by what it rises over a metre
+  double steepest = 0.0;  // of those in view: by what it rises over a metre
 
   [[nodiscard]] static std::int32_t cell_of(double along_m) noexcept {
     return static_cast<std::int32_t>(std::floor(along_m / kCell_m));

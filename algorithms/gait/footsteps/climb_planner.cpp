@@ -97,16 +97,15 @@ ClimbPlanner::Decision ClimbPlanner::trailing_step(const Situation& situation,
   goal.kind = StepKind::kTrailing;
   goal.foot = other(memory_.leading);
   if (memory_.trails_to_lip && over_lip_.trails_beside) {
-    goal.foothold = memory_.trailing_foothold;
-    goal.target = sole_beside_on_tread(situation.soles[index_of(memory_.leading)], goal.foot, landed_,
-                                       robot_->stance.half_width_m);
-    goal.foothold.position_m = goal.target.position_m;
+    goal.foothold = memory_.beside_foothold;
+    goal.foothold.position_m = situation.soles[index_of(memory_.leading)].position_m + memory_.odom_beside_m;
+    goal.target = sole_on(goal.foothold);
     return decision;
   }
   // The search looks from the foot that stands and soon offers the tread above: then the memory holds.
   const Foothold& seen = footholds.p_star_feet[index_of(goal.foot)];
   const bool same_tread = footholds.has_p_star && seen.polygon_id == memory_.trailing_foothold.polygon_id &&
-                          usable(seen) && footholds.has_lip_beyond >= memory_.trails_to_lip;
+                          usable(seen) && (footholds.has_lip_beyond || !memory_.trails_to_lip);
   goal.foothold = same_tread ? seen : memory_.trailing_foothold;
   goal.target = sole_on(goal.foothold);
   decision.trails_to_lip = memory_.trails_to_lip;
@@ -115,6 +114,7 @@ ClimbPlanner::Decision ClimbPlanner::trailing_step(const Situation& situation,
   }
   if (situation.stamp_ns - goal.foothold.last_seen_ns <= params_.remembered_ns) return decision;
   // Odometry has wandered since, but not from the foot that stands there: as far from it as the two footholds were.
+  decision.trails_to_lip = memory_.trails_to_lip;
   goal.foothold = memory_.trailing_foothold;
   goal.foothold.last_seen_ns = 0;
   goal.foothold.position_m = situation.soles[index_of(memory_.leading)].position_m + memory_.odom_trailing_m;
@@ -137,13 +137,23 @@ bool ClimbPlanner::trail_to_lip(const FootholdSet& footholds, const SolePose& le
   const double to_lip_m = toe_to_line_m(robot_->sole.collision, target, lip, target.yaw_rad);
   const double ahead_m = to_lip_m - params_.lip.trailing_stand_off_m;
   if (to_lip_m < params_.lip.near_m || ahead_m > params_.lip.trailing_ahead_m) return false;
+  // The search judged it where it lies beside: what rises on the tread, and where that ends to either side.
+  constexpr double kLeastAside_m = 0.01;
+  Foothold& foothold = trailing.foothold;
+  const double aside_m = (ahead_m + robot_->sole.contact.toe_x_m) * std::abs(math::sin(turn_rad));
+  const double room_m = std::min(foothold.side_room_m[0], foothold.side_room_m[1]);
+  if (ahead_m > foothold.toe_clearance_m - params_.floor_clearance_m || aside_m > room_m - kLeastAside_m) return false;
   const Vec2 way_m = ahead_m * unit_at(target.yaw_rad);
   target.position_m.head<2>() += way_m;
   target.position_m.z() -= target.up.head<2>().dot(way_m) / target.up.z();
   if (overlap(foot_rectangle(robot_->sole.collision, target, params_.floor.overlap_margin_m),
               foot_rectangle(robot_->sole.collision, leading, params_.floor.overlap_margin_m)))
     return false;
-  Foothold& foothold = trailing.foothold;
+  const SoleModel& sole = robot_->sole;
+  const double lip_clearance_m = params_.lip.trailing_stand_off_m + sole.collision.toe_x_m - sole.contact.toe_x_m;
+  foothold.clearance_m = std::min(foothold.clearance_m, lip_clearance_m);
+  foothold.toe_clearance_m -= ahead_m;
+  for (double& side_m : foothold.side_room_m) side_m -= aside_m;
   foothold.nosing_distance_m += unit_at(yaw_rad).dot(way_m);
   foothold.position_m = target.position_m;
   foothold.yaw_rad = target.yaw_rad;
@@ -307,7 +317,8 @@ bool ClimbPlanner::come_nearer(const Decision& leading) noexcept {
 bool ClimbPlanner::trail_beside() noexcept { return !std::exchange(over_lip_.trails_beside, true); }
 
 bool ClimbPlanner::close_up(const Situation& situation) noexcept {
-  const double apart_m = (situation.soles[0].position_m - situation.soles[1].position_m).norm();
+  const Vec3 way_m = situation.soles[0].position_m - situation.soles[1].position_m;
+  const double apart_m = std::abs((rotation_z(situation.soles[1].yaw_rad).transpose() * way_m).y());
   closes_up_ = on_treads_ && apart_m > 2.0 * (robot_->stance.half_width_m + params_.line_up.lateral_m);
   return closes_up_;
 }
@@ -359,7 +370,9 @@ bool ClimbPlanner::leads_to_goal(const Situation& situation, const FootholdSet& 
   const double goal_ahead_m = heading.dot(way_m);
   const double z_m = middle_of(situation.soles).position_m.z();
   const WalkGoal& goal = *goal_.laid_out;
-  const bool goes_on = (footholds.measured_rise_m < 0.0) == memory_.led_down && !goal.is_at_height(z_m);
+  const double to_goal_m = goal.odom_z_m - z_m, rise_m = footholds.measured_rise_m;
+  const bool passes = to_goal_m * (to_goal_m - rise_m) < 0.0 && !goal.is_by_rise(z_m, rise_m).value_or(false);
+  const bool goes_on = (rise_m < 0.0) == memory_.led_down && !goal.is_at_height(z_m) && !passes;
   const bool goal_is_here = goal_ahead_m < nosing_ahead_m && way_m.norm() < kReach_m;
   const bool amid_flight = on_treads_ && nosing_ahead_m < kOnTread_m && !goal_is_here && (!goal.has_height || goes_on);
   if (amid_flight || way_.takes_any_stairs()) return true;
@@ -371,7 +384,8 @@ bool ClimbPlanner::leads_to_goal(const Situation& situation, const FootholdSet& 
 // What the search offers is a ramp, or begins behind one: no steps lead over it.
 bool ClimbPlanner::is_over_ramp(const Situation& situation, const FootholdSet& footholds) const noexcept {
   const Vec2 nosing_m = 0.5 * (footholds.tread.nosing_a_m + footholds.tread.nosing_b_m).head<2>();
-  return usable(footholds.p_star_feet) && math::all_finite(footholds.tread.nosing_a_m) &&
+  const bool offers = footholds.has_p_star || footholds.obstruction == StopReason::kEdgeUncertain;
+  return offers && usable(footholds.p_star_feet) && math::all_finite(footholds.tread.nosing_a_m) &&
          math::all_finite(footholds.tread.nosing_b_m) &&
          LevelWalk::ramp_on_way(footholds.ground, middle_of(situation.soles).position_m.head<2>(), nosing_m) > 0.0;
 }
@@ -509,6 +523,7 @@ ClimbPlanner::Decision ClimbPlanner::decide(const Situation& situation, const Fo
 
   decision.goal = {StepKind::kLeading, lead, targets[index_of(lead)], feet[index_of(lead)]};
   decision.trailing = {StepKind::kTrailing, trail, targets[index_of(trail)], feet[index_of(trail)]};
+  decision.beside = decision.trailing.foothold;
   decision.trails_to_lip = decision.rise_m < 0.0 && trail_to_lip(footholds, decision.goal.target, decision.trailing);
   return decision;
 }
@@ -534,6 +549,8 @@ void ClimbPlanner::latched(const Situation& situation, const Decision& decision)
     memory_.trailing_foothold = decision.trailing.foothold;
     memory_.odom_trailing_m = decision.trailing.foothold.position_m - decision.goal.target.position_m;
     memory_.trails_to_lip = decision.trails_to_lip;
+    memory_.beside_foothold = decision.beside;
+    memory_.odom_beside_m = decision.beside.position_m - decision.goal.target.position_m;
   }
 }
 

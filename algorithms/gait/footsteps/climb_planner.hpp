@@ -79,6 +79,7 @@ class ClimbPlanner {
       field.ordered("near_m", "far_m");
       field("trailing_stand_off_m", p.trailing_stand_off_m, 0.0, 0.3,
             "Collision toe to the next lip of a foot that trails there: that lip was seen from a tread higher.");
+      field.ordered("trailing_stand_off_m", "near_m");
       field("trailing_ahead_m", p.trailing_ahead_m, 0.0, 0.3,
             "It goes no farther ahead of where it would stand beside the other one.");
     }
@@ -176,6 +177,7 @@ class ClimbPlanner {
     std::optional<LevelStep::Outcome> walk = std::nullopt;  // how the step there came out; none: it looks for its way
     StepGoal goal;
     StepGoal trailing;                           // the step that may come after a leading or passing one
+    Foothold beside;                             // of a leading step: where the trailing one would end beside it
     StopReason obstruction = StopReason::kNone;  // without a step: why
     double measured_m = 0.0;
     double rise_m = 0.0;         // of a leading step, negative down
@@ -265,6 +267,8 @@ class ClimbPlanner {
   struct Memory {
     Foothold trailing_foothold;           // from the leading latch
     Vec3 odom_trailing_m = Vec3::Zero();  // from the leading foot's target to it
+    Foothold beside_foothold;             // the same beside it, where that goes on to a lip
+    Vec3 odom_beside_m = Vec3::Zero();
     Foot last_swing = Foot::kRight;
     std::int32_t swings_in_a_row = 1;  // of that foot
     Foot leading = Foot::kLeft;

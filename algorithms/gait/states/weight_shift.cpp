@@ -41,9 +41,13 @@ Transition WeightShift::tick(const GaitInput& in, GaitShared& gait) noexcept {
   if (tick_ < shift_ticks_ || search_.state() != StepSearch::State::kFound || !in.usable) return {};
   if (!(in.odom_dcm_error_m.norm() <= gait.params.steady_m)) return wait(params);
   const StepGoal& planned = decision_.goal;
-  const ClimbPlanner::Decision decision =
+  ClimbPlanner::Decision decision =
       gait.planner.decide(situation(in, planned.kind == StepKind::kLeading, planned.foot), in.footholds);
   if (!decision.has_step) return wait(params);
+  if (decision.trails_to_lip != decision_.trails_to_lip) {  // the step after it is the one that the legs can do
+    decision.trailing = decision_.trailing;
+    decision.trails_to_lip = decision_.trails_to_lip;
+  }
   if (close_to_planned(params, decision.goal)) return Transition::swing(decision, search_.plan().tried);
   // Once its heel is up the foot keeps its goal: a new shift of the weight is planned from a flat foot.
   if (gait.plan.is_on_toe(planned.foot)) return Transition::swing(decision_, search_.plan().tried);

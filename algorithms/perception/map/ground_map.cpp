@@ -216,12 +216,12 @@ void GroundMap::leave_out(const Transform& map_T_local, const ConvexPolygon& loc
   constexpr std::int32_t kAbout = 2;        // squares: where the planes meet is known so well
   constexpr double kLongestTread_m = 0.60;  // treads may be built askew
   const bool is_ramp = highest_m - lowest_m > kLongestTread_m * rise;
-  if (is_ramp) out.steepest = std::max(out.steepest, rise);
   for (std::int32_t y = 0; y < GroundView::kSide_cells; ++y) {
     const auto from = static_cast<std::size_t>(y);
     if (first_m[from] > last_m[from]) continue;
     const std::uint64_t bits =
         GroundView::bits_of(GroundView::cell_of(first_m[from]) - kAbout, GroundView::cell_of(last_m[from]) + kAbout);
+    if (is_ramp && bits != 0) out.steepest = std::max(out.steepest, rise);
     const std::int32_t last = std::min(y + kAbout, GroundView::kSide_cells - 1);
     for (std::int32_t row = std::max(y - kAbout, 0); row <= last; ++row) {
       out.level[static_cast<std::size_t>(row)] &= ~bits;

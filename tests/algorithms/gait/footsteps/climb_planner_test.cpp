@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
+
 namespace polygmap {
 namespace {
 
@@ -240,6 +242,17 @@ TEST(ClimbPlanner, FlightLeadsAwayFromTheGoalsHeightFirst_GoesOnAsItWent) {
   EXPECT_EQ(on.planner.look_and_decide(on.situation, next).goal.kind, StepKind::kLeading);
 }
 
+TEST(ClimbPlanner, NextTreadLiesFartherPastTheGoalsHeightThanThisOneBeforeIt_WalksToTheGoal) {
+  OnATread on;
+  on.planner.go_to({.ahead_m = 4.0, .left_m = 3.0, .up_m = 0.095, .has_height = true});
+  on.planner.lay_out_destination(on.situation.soles);
+  FootholdSet next = next_tread(on);
+  next.measured_rise_m = 0.18;
+  EXPECT_EQ(on.planner.look_and_decide(on.situation, next).goal.kind, StepKind::kLeading);
+  next.measured_rise_m = 0.2;
+  EXPECT_TRUE(on.planner.look_and_decide(on.situation, next).walks);
+}
+
 TEST(ClimbPlanner, StandsBelowItsGoal_SaysThatItSawNoWayUp) {
   OnATread on;
   on.planner.go_to({.up_m = 1.0, .has_height = true});
@@ -275,6 +288,7 @@ FootholdSet deep_tread_below(const OnATread& on) {
   for (std::size_t i = 0; i < kFootCount; ++i) {
     set.p_star_feet[i].position_m.x() = 1.22 - heel_m;
     set.p_star_feet[i].position_m.z() = -0.02;
+    set.p_star_feet[i].toe_clearance_m = std::numeric_limits<double>::infinity();
   }
   return set;
 }
@@ -309,6 +323,42 @@ TEST(ClimbPlanner, NextLipIsNotSeenOrNearAnyway_TrailsBeside) {
   EXPECT_FALSE(on.planner.decide(on.situation, set).trails_to_lip) << "a usual tread";
   set.lip_beyond.nosing_a_m.x() = set.lip_beyond.nosing_b_m.x() = kNextLip_x_m + 0.2;
   EXPECT_FALSE(on.planner.decide(on.situation, set).trails_to_lip) << "a landing";
+}
+
+TEST(ClimbPlanner, SomethingOnTheTreadBeforeTheLip_TrailsBesideIt) {
+  OnATread on;
+  stand_at_lip(on);
+  FootholdSet set = deep_tread_below(on);
+  for (Foothold& foot : set.p_star_feet) foot.toe_clearance_m = 0.05;
+  EXPECT_FALSE(on.planner.decide(on.situation, set).trails_to_lip);
+}
+
+TEST(ClimbPlanner, LipIsSlanted_TrailsToItWhereThereIsRoomAside) {
+  OnATread on;
+  stand_at_lip(on);
+  FootholdSet set = deep_tread_below(on);
+  set.lip_beyond.nosing_a_m.x() += 0.05;
+  set.lip_beyond.nosing_b_m.x() -= 0.05;
+  const ClimbPlanner::Decision wide = on.planner.decide(on.situation, set);
+  EXPECT_TRUE(wide.trails_to_lip);
+  EXPECT_NEAR(wide.trailing.target.yaw_rad, -0.1, 1e-3) << "it turns with the tread";
+  for (Foothold& foot : set.p_star_feet) foot.side_room_m[1] = 0.02;
+  EXPECT_FALSE(on.planner.decide(on.situation, set).trails_to_lip);
+}
+
+TEST(ClimbPlanner, TrailingFootWasToGoBesideANarrowStance_KeepsItsPlaceWhenTheLegsRefuseTheLip) {
+  OnATread on;
+  stand_at_lip(on);
+  FootholdSet set = deep_tread_below(on);
+  for (std::size_t i = 0; i < kFootCount; ++i) set.p_star_feet[i].position_m.y() *= 0.7;
+  const ClimbPlanner::Decision leading = on.planner.decide(on.situation, set);
+  ASSERT_TRUE(leading.trails_to_lip);
+  on.planner.latched(on.situation, leading);
+  on.situation.soles[index_of(leading.goal.foot)] = leading.goal.target;
+  on.planner.landed(on.situation.soles);
+  EXPECT_TRUE(on.planner.trail_beside());
+  const StepGoal beside = on.planner.decide(on.situation, {}).goal;
+  EXPECT_NEAR((beside.target.position_m - set.p_star_feet[index_of(beside.foot)].position_m).norm(), 0.0, 1e-9);
 }
 
 TEST(ClimbPlanner, LegsCannotTrailToTheLip_TrailsBesideFromThenOn) {
