@@ -85,7 +85,9 @@ StopReason FootholdSearch::judge_below(const Lip& lip, std::size_t level) noexce
   pending_.measured_rise_m = tread.height_m - z_foot_;
   pending_.measured_tread_m = tread.depth_m;
   pending_.tread = {over.left_m, over.right_m};
-  constexpr double kVague_m = 0.016;  // a toe stands 20 mm before it
+  // A lip with a larger margin is not told: the gait sets a toe 20 mm before it. Both were chosen in the simulation
+  // alone.
+  constexpr double kVague_m = 0.016;
   pending_.has_lip_beyond = tread.ends.lip && tread.back_margin_m <= kVague_m;
   if (tread.ends.lip) pending_.lip_beyond = {tread.ends.lip->left_m, tread.ends.lip->right_m};
   if (-pending_.measured_rise_m > params_.down.drop_max_m) return StopReason::kDropTooDeep;

@@ -403,7 +403,7 @@ void ClimbPlanner::look_for_ramps(const Situation& situation, const FootholdSet&
 
 // The map has it in some pictures and not in others.
 bool ClimbPlanner::saw_lately(const std::optional<std::int64_t>& stamp_ns, const Situation& situation) const noexcept {
-  constexpr std::int64_t kLately_ns = 1'500'000'000;  // no longer than a step takes: then it may look elsewhere
+  constexpr std::int64_t kLately_ns = 1'500'000'000;  // a step on the floor takes 1.4 s, and then it looks elsewhere
   return stamp_ns && situation.stamp_ns - *stamp_ns < kLately_ns;
 }
 

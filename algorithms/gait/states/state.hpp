@@ -83,7 +83,7 @@ struct Transition {
   bool same_foot = false;                 // of a shift: the weight is over the stance foot already
   GaitPhase phase = GaitPhase::kStopped;  // of an end, both feet standing:
   StopReason reason = StopReason::kNone;  // why,
-  double measured_m = 0.0;                // and the rise or tread behind it
+  double measured_m = 0.0;                // and the rise, tread or slope behind it
   std::optional<ClimbPlanner::Decision> decision = std::nullopt;  // of a shift or a swing
   std::optional<StepTry> tried = std::nullopt;                    // of a swing: the shape that the legs can do
 

@@ -25,8 +25,8 @@ void SwingPhase::begin(const GaitInput& in, GaitShared& gait, const ClimbPlanner
     odom_off_path_m_ = in.state.odom_T_sole[index_of(goal_.foot)].p_m - start.p_m;
     odom_off_path_m_.z() = 0.0;
   }
-  // A riser may be at its heel: it goes on from where it stands, which is ahead of where the plan has it. Where
-  // the legs have ranges to spare: feet stood up to 16 mm ahead in climbs of the simulation.
+  // A riser may be at its heel: it goes on from where it stands, which is ahead of where the plan has it. Feet stood up
+  // to 16 mm ahead in climbs of the simulation. The search proves a leading step down without this.
   constexpr double kMostAhead_m = 0.02;
   const double ahead_m = math::clamp(start.R.col(0).dot(odom_off_path_m_), 0.0, kMostAhead_m);
   const bool leads_down = goes_down(goal_, soles) && leads(goal_.kind);
